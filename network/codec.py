@@ -1,0 +1,248 @@
+"""Bytes on the wire: everything about how messages are written and read lives here.
+
+Messages between nodes are little-endian and begin with one header of 24 bytes:
+
+| offset | type | field |
+|---|---|---|
+| 0 | u8 | version of this layout, 1 |
+| 1 | u8 | kind: 1 consensus, 2 pixels, 3 confirm |
+| 2 | 3 x u16 | consensus: numbers in the payload K, round, sender's degree; pixels: height, width, 0 |
+| 8 | u64 | run: BLAKE2b of its name, 8 bytes |
+| 16 | u32 | sender: BLAKE2b of its name, 4 bytes |
+| 20 | u32 | frame |
+| 24 | | consensus: K float64; pixels: height x width x 3 bytes, BGR |
+
+Reading never trusts: what is not exactly such a message is refused with its reason.
+"""
+
+import json
+import struct
+from functools import lru_cache
+from hashlib import blake2b
+from typing import Any, TypeVar
+
+import numpy as np
+from jaxtyping import Float, Int
+from pydantic import TypeAdapter, ValidationError
+
+from network.errors import RefusedMessage
+from network.messages import (
+    ConfirmMessage,
+    ConsensusMessage,
+    ControlMessage,
+    EstimateMessage,
+    Message,
+    PeerMessage,
+    PixelsMessage,
+    PublicMessage,
+    StatusMessage,
+    TruthMessage,
+)
+
+VERSION = 1
+MAX_PIXELS = 64_000_000
+MAX_JSON_BYTES = 1_000_000
+MAX_MAGNITUDE = 1e150
+"""Larger numbers are refused like infinity: sums and products of them would overflow."""
+
+_HEADER = struct.Struct("<BBHHHQII")
+_KINDS: dict[type[PeerMessage], int] = {ConsensusMessage: 1, PixelsMessage: 2, ConfirmMessage: 3}
+_JSON: dict[type, TypeAdapter[Any]] = {
+    kind: TypeAdapter(kind) for kind in (EstimateMessage, ControlMessage, StatusMessage, TruthMessage)
+}
+_JSON_REASONS = {"json_invalid": "json", "finite_number": "not-finite", "value_error": "shape"}
+
+_Public = TypeVar("_Public", bound=PublicMessage)
+
+
+def encode(run: str, message: Message) -> bytes:
+    """Any message in bytes.
+
+    Raises:
+        ValueError: A number in it is not finite.
+    """
+    match message:
+        case ConsensusMessage():
+            return encode_consensus(run, message)
+        case PixelsMessage():
+            return encode_pixels(run, message)
+        case ConfirmMessage():
+            return encode_confirm(run, message)
+        case _:
+            return encode_public(message)
+
+
+def decode(kind: type[PeerMessage], run: str, sender: str, data: bytes) -> PeerMessage:
+    """A message of one node to another.
+
+    Args:
+        kind: What is expected.
+        run: The run that it must belong to.
+        sender: The node that it must come from.
+        data: What came.
+
+    Raises:
+        RefusedMessage: It is something else.
+    """
+    if kind is ConsensusMessage:
+        return decode_consensus(run, sender, data)
+    if kind is PixelsMessage:
+        return decode_pixels(run, sender, data)
+    return decode_confirm(run, sender, data)
+
+
+def encode_consensus(run: str, message: ConsensusMessage) -> bytes:
+    """A round's value in bytes.
+
+    Raises:
+        ValueError: A number in it is not finite.
+    """
+    payload = message.payload
+    if not _usable(payload):
+        raise ValueError(
+            f"{message.sender} has a value that is not finite in frame {message.frame}: {payload}"
+        )
+    header = _header(run, message, payload.size, message.round, message.degree)
+    return header + payload.astype("<f8", copy=False).tobytes()
+
+
+def decode_consensus(run: str, sender: str, data: bytes) -> ConsensusMessage:
+    """A round's value; its payload is a read-only view of the data.
+
+    Raises:
+        RefusedMessage: The data are not such a message.
+    """
+    frame, size, round_, degree = _read_header(ConsensusMessage, run, sender, data)
+    if len(data) != _HEADER.size + 8 * size:
+        raise RefusedMessage("length")
+    if round_ < 1:
+        raise RefusedMessage("round")
+    payload = np.frombuffer(data, "<f8", size, _HEADER.size)
+    if not _usable(payload):
+        raise RefusedMessage("not-finite")
+    return ConsensusMessage(sender, frame, round_, degree, payload)
+
+
+def encode_pixels(run: str, message: PixelsMessage) -> bytes:
+    """A picture in bytes."""
+    height, width, _ = message.image.shape
+    return b"".join((_header(run, message, height, width, 0), np.ascontiguousarray(message.image).data))
+
+
+def decode_pixels(run: str, sender: str, data: bytes) -> PixelsMessage:
+    """A picture; its image is a read-only view of the data.
+
+    Raises:
+        RefusedMessage: The data are not such a message, or the picture has more than ``MAX_PIXELS``.
+    """
+    frame, height, width, _ = _read_header(PixelsMessage, run, sender, data)
+    if not 0 < height * width <= MAX_PIXELS:
+        raise RefusedMessage("size")
+    if len(data) != _HEADER.size + 3 * height * width:
+        raise RefusedMessage("length")
+    image = np.frombuffer(data, np.uint8, offset=_HEADER.size).reshape(height, width, 3)
+    return PixelsMessage(sender, frame, image)
+
+
+def encode_confirm(run: str, message: ConfirmMessage) -> bytes:
+    """A confirmation in bytes."""
+    return _header(run, message, 0, 0, 0)
+
+
+def decode_confirm(run: str, sender: str, data: bytes) -> ConfirmMessage:
+    """A confirmation.
+
+    Raises:
+        RefusedMessage: The data are not such a message.
+    """
+    frame, *_ = _read_header(ConfirmMessage, run, sender, data)
+    if len(data) != _HEADER.size:
+        raise RefusedMessage("length")
+    return ConfirmMessage(sender, frame)
+
+
+def encode_public(message: PublicMessage) -> bytes:
+    """A public message as one line of JSON.
+
+    Raises:
+        ValueError: A number in it is not finite.
+    """
+    fields = _JSON[type(message)].dump_python(message, mode="json")
+    return json.dumps(fields, separators=(",", ":"), allow_nan=False).encode()
+
+
+def decode_public(kind: type[_Public], data: bytes) -> _Public:
+    """A public message from JSON.
+
+    Raises:
+        RefusedMessage: The data are not such a message.
+    """
+    if len(data) > MAX_JSON_BYTES:
+        raise RefusedMessage("length")
+    try:
+        message: _Public = _JSON[kind].validate_json(data)
+    except ValidationError as error:
+        found = error.errors(include_url=False, include_context=False)[0]["type"]
+        raise RefusedMessage(_JSON_REASONS.get(found, "fields")) from error
+    return message
+
+
+def pack_symmetric(matrix: Float[np.ndarray, "D D"]) -> Float[np.ndarray, " K"]:
+    """The upper triangle of a symmetric matrix, row by row; K = D (D + 1) / 2."""
+    return matrix[np.triu_indices(len(matrix))]
+
+
+def unpack_symmetric(triangle: Float[np.ndarray, " K"], size: int) -> Float[np.ndarray, "D D"]:
+    """The symmetric matrix of an upper triangle.
+
+    Args:
+        triangle: What ``pack_symmetric`` gives.
+        size: Rows of the matrix.
+
+    Raises:
+        ValueError: The triangle does not have size (size + 1) / 2 numbers.
+    """
+    if len(triangle) != size * (size + 1) // 2:
+        raise ValueError(f"{len(triangle)} numbers are not the upper triangle of a {size} x {size} matrix")
+    return triangle[_places(size)]
+
+
+@lru_cache
+def _places(size: int) -> Int[np.ndarray, "D D"]:
+    """Where in the upper triangle each entry of the matrix stands."""
+    places = np.zeros((size, size), dtype=np.intp)
+    rows, columns = np.triu_indices(size)
+    places[rows, columns] = places[columns, rows] = np.arange(len(rows))
+    return places
+
+
+def _usable(payload: Float[np.ndarray, " K"]) -> bool:
+    """Whether all numbers are finite and small enough to compute with; not so for NaN."""
+    return bool(np.abs(payload).max(initial=0.0) <= MAX_MAGNITUDE)
+
+
+@lru_cache
+def _digest(name: str, size: int) -> int:
+    return int.from_bytes(blake2b(name.encode(), digest_size=size).digest(), "little")
+
+
+def _header(run: str, message: PeerMessage, a: int, b: int, c: int) -> bytes:
+    return _HEADER.pack(
+        VERSION, _KINDS[type(message)], a, b, c, _digest(run, 8), _digest(message.sender, 4), message.frame
+    )
+
+
+def _read_header(kind: type[PeerMessage], run: str, sender: str, data: bytes) -> tuple[int, int, int, int]:
+    """Frame and the three numbers that depend on the kind."""
+    if len(data) < _HEADER.size:
+        raise RefusedMessage("length")
+    version, code, a, b, c, run_id, sender_id, frame = _HEADER.unpack_from(data)
+    if version != VERSION:
+        raise RefusedMessage("version")
+    if code != _KINDS[kind]:
+        raise RefusedMessage("kind")
+    if run_id != _digest(run, 8):
+        raise RefusedMessage("run")
+    if sender_id != _digest(sender, 4):
+        raise RefusedMessage("sender")
+    return frame, a, b, c

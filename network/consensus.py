@@ -1,0 +1,177 @@
+"""Everything about consensus rounds lives here: a state machine, given messages, tells what to send.
+
+It knows no clock and no network. Links deliver in order, so that a neighbour's later message tells that the
+one waited for will not come. A neighbour that keeps to the rounds is never more than one ahead: it waits too.
+"""
+
+from collections import Counter
+from collections.abc import Iterable
+
+import numpy as np
+from jaxtyping import Float
+
+from network.messages import ConsensusMessage
+from network.weights import Weights
+
+_Position = tuple[int, int]
+"""Frame and round, in the order in which a node goes through them."""
+
+_NOWHERE: _Position = (-1, 0)
+
+
+class Consensus:
+    """Average consensus of one node with its neighbours, frame after frame (Eq. 3 of Jing & Chen).
+
+    Methods that may complete rounds return the messages to send to all neighbours now, in order. There may be
+    several: where one neighbour held a round up, the next round's messages of the others can be here already.
+
+    Attributes:
+        name: The node.
+        neighbors: Whom it exchanges messages with, sorted by name: the order in which they are summed.
+        value: The state after the rounds done so far, which estimates the average over all nodes.
+        rounds_done: Rounds done in this frame.
+        done: Whether this frame's rounds are over.
+        counters: Messages that were of no use, by reason, and frames that were ``cut``.
+    """
+
+    def __init__(self, name: str, neighbors: Iterable[str], weights: Weights, iterations: int) -> None:
+        """A node before its first frame.
+
+        Args:
+            name: The node.
+            neighbors: Whom it exchanges messages with.
+            weights: The rule of weights, the same in all nodes.
+            iterations: Rounds in each frame, at least 0.
+        """
+        self.name = name
+        self.neighbors = tuple(sorted(neighbors))
+        self.value: Float[np.ndarray, " K"] = np.empty(0)
+        self.rounds_done = 0
+        self.done = True
+        self.counters: Counter[str] = Counter()
+        self._weights = weights
+        self._iterations = iterations
+        self._position = _NOWHERE
+        self._degree = 0
+        self._gone: set[str] = set()
+        self._absent: set[str] = set()  # in this frame: the gone, also those restored during it
+        self._heard = dict.fromkeys(self.neighbors, _NOWHERE)
+        self._inbox: dict[tuple[int, str], ConsensusMessage] = {}  # of this frame, by round and sender
+        self._early: dict[str, ConsensusMessage] = {}  # first rounds of later frames, by sender
+
+    def begin(self, frame: int, value: Float[np.ndarray, " K"]) -> tuple[ConsensusMessage, ...]:
+        """Starts a frame with the node's own value.
+
+        Raises:
+            ValueError: The frame is not later than the last one, or that one is not over.
+        """
+        last_frame, _ = self._position
+        if not self.done or frame <= last_frame:
+            raise ValueError(f"{self.name} cannot begin frame {frame}: it is in frame {last_frame}")
+        self.value = np.array(value, dtype=float)
+        self.rounds_done = 0
+        self.done = False
+        self._absent = set(self._gone)
+        first = self._enter_round(frame)
+        due = [message for message in self._early.values() if message.frame <= frame]
+        for message in due:
+            del self._early[message.sender]
+            self._keep(message)
+        return first + self._advance()
+
+    def receive(self, message: ConsensusMessage) -> tuple[ConsensusMessage, ...]:
+        """Takes a neighbour's message; one that is of no use is counted and dropped."""
+        sender, position = message.sender, (message.frame, message.round)
+        if sender not in self._heard:
+            self.counters["stranger"] += 1
+        elif position == self._heard[sender]:
+            self.counters["duplicate"] += 1
+        elif position < self._heard[sender]:
+            self.counters["old"] += 1
+        else:
+            self._heard[sender] = position
+            self._keep(message)
+        return self._advance()
+
+    def waiting_for(self) -> tuple[str, ...]:
+        """The neighbours whose message of this round may still come, sorted by name."""
+        if self.done:
+            return ()
+        return tuple(name for name in self._present() if self._heard[name] < self._position)
+
+    def drop(self, neighbor: str) -> tuple[ConsensusMessage, ...]:
+        """Goes on without a neighbour from now on; what it has said for this round still counts."""
+        _, round_ = self._position
+        self._gone.add(neighbor)
+        self._absent.add(neighbor)
+        self._inbox.pop((round_ + 1, neighbor), None)
+        return self._advance()
+
+    def restore(self, neighbor: str) -> None:
+        """Counts on a neighbour again, from the next frame on."""
+        self._gone.discard(neighbor)
+
+    def cut(self) -> None:
+        """Ends the frame with the rounds done so far."""
+        if not self.done:
+            self.counters["cut"] += 1
+            self._finish()
+
+    def _present(self) -> tuple[str, ...]:
+        """The neighbours that take part in this frame: neither gone nor already in a later one."""
+        frame, _ = self._position
+        return tuple(
+            name for name in self.neighbors if name not in self._absent and self._heard[name] < (frame + 1, 0)
+        )
+
+    def _keep(self, message: ConsensusMessage) -> None:
+        """Keeps a message that this round, the next one, or a later frame's first can use."""
+        frame, round_ = self._position
+        if (message.frame, message.round) < self._position:
+            self.counters["old"] += 1
+        elif message.frame > frame and message.round == 1:
+            self._early[message.sender] = message
+        elif message.frame > frame or message.round > min(round_ + 1, self._iterations):
+            self.counters["ahead"] += 1
+        elif message.sender in self._absent:
+            self.counters["absent"] += 1
+        elif message.payload.shape != self.value.shape:
+            self.counters["shape"] += 1
+        else:
+            self._inbox[message.round, message.sender] = message
+
+    def _enter_round(self, frame: int) -> tuple[ConsensusMessage, ...]:
+        """Enters the round after those done, or ends the frame where there is none or nobody to talk to."""
+        self._position = (frame, self.rounds_done + 1)
+        self._degree = len(self._present())
+        if self.rounds_done == self._iterations or self._degree == 0:
+            self._finish()
+            return ()
+        return (ConsensusMessage(self.name, frame, self.rounds_done + 1, self._degree, self.value),)
+
+    def _advance(self) -> tuple[ConsensusMessage, ...]:
+        """Completes rounds as long as nobody is waited for."""
+        messages: tuple[ConsensusMessage, ...] = ()
+        while not self.done and not self.waiting_for():
+            self._step()
+            messages += self._enter_round(self._position[0])
+        return messages
+
+    def _step(self) -> None:
+        """One round, with the messages that have come for it."""
+        _, round_ = self._position
+        own, value = self.value, self.value.copy()
+        for name in self.neighbors:
+            message = self._inbox.pop((round_, name), None)
+            if message is not None:
+                # a_l(t) = a_l(t-1) + Σ_j w_lj (a_j(t-1) - a_l(t-1))
+                value += self._weights.weight(self._degree, message.degree) * (message.payload - own)
+        self.value = value
+        self.rounds_done += 1
+
+    def _finish(self) -> None:
+        """Ends the frame: what still comes for it is old."""
+        frame, _ = self._position
+        self.done = True
+        self._position = (frame, self._iterations + 1)
+        self._inbox.clear()

@@ -1,0 +1,146 @@
+"""What carries a node's messages: the interface, who hears whom, and what is counted.
+
+A node's shell speaks to a ``Transport`` and knows nothing of Zenoh. ``MemoryNetwork`` does the same work for
+many nodes in one thread; both count alike.
+"""
+
+import logging
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from network.graph import Graph
+from network.messages import (
+    ConfirmMessage,
+    ConsensusMessage,
+    ControlMessage,
+    EstimateMessage,
+    Message,
+    PeerMessage,
+    PixelsMessage,
+    StatusMessage,
+)
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Links:
+    """Whom one node exchanges messages with.
+
+    Attributes:
+        neighbors: Nodes that it runs consensus with, both ways.
+        sinks: Nodes that get its pictures and confirm them.
+        cameras: Nodes whose pictures it gets and confirms.
+
+    Raises:
+        ValueError: Another node has two of these parts; it would speak with two voices under one name.
+    """
+
+    neighbors: tuple[str, ...] = ()
+    sinks: tuple[str, ...] = ()
+    cameras: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        others = Counter(self.neighbors + self.sinks + self.cameras)
+        for name, parts in others.items():
+            if parts > 1:
+                raise ValueError(f"{name} is linked twice: it can be a neighbour, a sink or a camera")
+
+    def heard(self) -> dict[str, type[PeerMessage]]:
+        """The nodes that speak to this one, and what each of them sends."""
+        return {
+            **dict.fromkeys(self.neighbors, ConsensusMessage),
+            **dict.fromkeys(self.sinks, ConfirmMessage),
+            **dict.fromkeys(self.cameras, PixelsMessage),
+        }
+
+    def receivers(self, message: Message) -> tuple[str, ...]:
+        """The nodes that a message goes to; none for public messages, which nobody inside waits for."""
+        match message:
+            case ConsensusMessage():
+                return self.neighbors
+            case PixelsMessage():
+                return self.sinks
+            case ConfirmMessage():
+                return self.cameras
+            case _:
+                return ()
+
+
+def links_of(graph: Graph, sinks: Iterable[str] = ()) -> dict[str, Links]:
+    """The links of all nodes: consensus along the graph's edges, pictures from all its nodes to all sinks."""
+    sinks = tuple(sinks)
+    return {
+        **{name: Links(neighbors=graph.neighbors(name), sinks=sinks) for name in graph.names},
+        **{name: Links(cameras=graph.names) for name in sinks},
+    }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Traffic:
+    """What a node has sent and refused.
+
+    Attributes:
+        messages: Messages sent, by kind. One to d receivers counts d times; a public one once.
+        bytes: Their payloads in bytes, counted likewise.
+        refused: Peers' messages that could not be used, by reason.
+    """
+
+    messages: Counter[str] = field(default_factory=Counter)
+    bytes: Counter[str] = field(default_factory=Counter)
+    refused: Counter[str] = field(default_factory=Counter)
+
+    def count(self, kind: str, size_bytes: int, receivers: int) -> None:
+        """Counts a message of one kind that is sent."""
+        self.messages[kind] += receivers
+        self.bytes[kind] += receivers * size_bytes
+
+    def refuse(self, sender: str, reason: str) -> None:
+        """Counts a message that is refused, and logs the first of its reason."""
+        if not self.refused[reason]:
+            _log.warning("refused a message of %s (%s); more of this kind are only counted", sender, reason)
+        self.refused[reason] += 1
+
+
+class Transport(Protocol):
+    """A node's way to the others.
+
+    Attributes:
+        counters: What it has sent and refused.
+    """
+
+    counters: Traffic
+
+    def announce(self) -> None:
+        """Tells everybody that this node hears: from here on messages to it arrive."""
+
+    def alive(self, name: str) -> bool:
+        """Whether a node has announced itself and is there."""
+
+    def wait_until_alive(self, names: Iterable[str], timeout_s: float) -> tuple[str, ...]:
+        """Waits until nodes are alive; returns those that are still missing when time is up."""
+
+    def wait_for_control(self, timeout_s: float) -> ControlMessage | None:
+        """The next order to this run, None when time is up; 0 only looks."""
+
+    def send(self, message: PeerMessage | EstimateMessage | StatusMessage) -> None:
+        """Sends a message of this node to whom it concerns."""
+
+    def receive(self, sender: str, timeout_s: float) -> PeerMessage | None:
+        """The next valid message of one of the nodes that are linked to this one.
+
+        Args:
+            sender: The node.
+            timeout_s: How long to wait for it; 0 only looks.
+
+        Returns:
+            Its message, None when time is up or the sender is gone.
+        """
+
+    def ask_estimate(self, name: str, timeout_s: float) -> EstimateMessage | None:
+        """A linked node's latest estimate, from which a node that returns goes on; None without an answer."""
+
+    def close(self) -> None:
+        """Leaves the network, within seconds whatever the others do."""

@@ -1,0 +1,255 @@
+"""A node's transport over Eclipse Zenoh: every publisher, subscriber and token of a node is declared here.
+
+``receive`` waits in Zenoh's own channels, which is faster than callbacks but knows no time-out. What ends the
+wait is an empty message that the node puts into the channel itself: the watchdog when time is up, liveliness
+when the sender is gone. Whoever receives it looks again whether there is anything left to wait for.
+"""
+
+import contextlib
+import queue
+import threading
+import time
+from collections.abc import Iterable, Sequence
+from functools import partial
+
+import zenoh
+from zenoh import CongestionControl, Locality, Priority
+
+from network import codec, keys, sessions
+from network.errors import RefusedMessage
+from network.messages import (
+    ConfirmMessage,
+    ConsensusMessage,
+    ControlMessage,
+    EstimateMessage,
+    PeerMessage,
+    PixelsMessage,
+    StatusMessage,
+    TruthMessage,
+)
+from network.transport import Links, Traffic
+
+_DEPTHS: dict[type[PeerMessage], int] = {ConsensusMessage: 64, ConfirmMessage: 64, PixelsMessage: 4}
+_KEYS = {ConsensusMessage: keys.consensus, ConfirmMessage: keys.confirm, PixelsMessage: keys.pixels}
+_ENCODINGS = {
+    kind: f"application/json;dcpf.{kind.kind}.v1"
+    for kind in (EstimateMessage, StatusMessage, ControlMessage, TruthMessage)
+}
+_WATCH_PERIOD_S = 0.004
+_WAKE_UP = b""
+
+_Inbox = zenoh.Subscriber[zenoh.handlers.Handler[zenoh.Sample]]
+
+
+class ZenohTransport:
+    """A node's way to the others over Zenoh (see ``network.transport.Transport``).
+
+    Attributes:
+        counters: What it has sent and refused.
+    """
+
+    def __init__(
+        self,
+        run: str,
+        name: str,
+        links: Links,
+        listen: Sequence[str],
+        connect: Sequence[str],
+        *,
+        drop_late_pixels: bool,
+    ) -> None:
+        """Opens the session and declares everything but the node's token.
+
+        Args:
+            run: Name of the run.
+            name: The node.
+            links: The nodes that it is linked to.
+            listen: Endpoints where they find it.
+            connect: Endpoints of the router and of those that it has to find.
+            drop_late_pixels: Whether pictures that do not get through in time are dropped (real time) or
+                waited for (lockstep).
+
+        Raises:
+            NetworkError: An endpoint is malformed, or one to listen on cannot be had.
+        """
+        self.counters = Traffic()
+        self._run, self._name, self._links = run, name, links
+        self._heard = links.heard()
+        self._alive: set[str] = set()
+        self._alive_changed = threading.Condition()
+        self._orders: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._latest: dict[str, bytes] = {}
+        self._wait: tuple[str, float] | None = None
+        self._closed = threading.Event()
+        self._session = sessions.open_peer(listen, connect)
+        self._inboxes = {sender: self._declare_inbox(sender, kind) for sender, kind in self._heard.items()}
+        self._declare_orders()
+        self._publishers = self._declare_publishers(drop_late_pixels=drop_late_pixels)
+        self._declare_liveliness()
+        threading.Thread(target=self._watch, name="watchdog", daemon=True).start()
+
+    def announce(self) -> None:
+        """Tells everybody that this node hears: from here on messages to it arrive."""
+        self._token = self._session.liveliness().declare_token(keys.alive(self._run, self._name))
+
+    def alive(self, name: str) -> bool:
+        """Whether a node has announced itself and is there."""
+        return name in self._alive
+
+    def wait_until_alive(self, names: Iterable[str], timeout_s: float) -> tuple[str, ...]:
+        """Waits until nodes are alive; returns those that are still missing when time is up."""
+        names = tuple(names)
+        with self._alive_changed:
+            self._alive_changed.wait_for(lambda: self._alive.issuperset(names), timeout_s)
+            return tuple(name for name in names if name not in self._alive)
+
+    def wait_for_control(self, timeout_s: float) -> ControlMessage | None:
+        """The next order to this run, None when time is up; 0 only looks."""
+        deadline = time.monotonic() + timeout_s
+        while True:
+            try:
+                data = self._orders.get(timeout=max(0.0, deadline - time.monotonic()))
+            except queue.Empty:
+                return None
+            try:
+                return codec.decode_public(ControlMessage, data)
+            except RefusedMessage as refusal:
+                self.counters.refuse("control", refusal.reason)
+
+    def send(self, message: PeerMessage | EstimateMessage | StatusMessage) -> None:
+        """Sends a message of this node to whom it concerns."""
+        data = codec.encode(self._run, message)
+        if isinstance(message, PeerMessage):
+            receivers = sum(name in self._alive for name in self._links.receivers(message))
+        else:
+            receivers = 1
+        self.counters.count(message.kind, len(data), receivers)
+        publisher = self._publishers[type(message)]
+        # those who ask want the joint estimate, not that of one camera on its own
+        if isinstance(message, StatusMessage) or (
+            isinstance(message, EstimateMessage) and message.estimator != "single"
+        ):
+            self._latest[str(publisher.key_expr)] = data
+        publisher.put(data)
+
+    def receive(self, sender: str, timeout_s: float) -> PeerMessage | None:
+        """The next valid message of a linked node, None when time is up or the sender is gone."""
+        inbox = self._inboxes[sender]
+        deadline = time.monotonic() + timeout_s
+        self._wait = (sender, deadline)
+        try:
+            while True:
+                over = sender not in self._alive or time.monotonic() >= deadline
+                sample = inbox.try_recv() if over else inbox.recv()
+                if sample is None:
+                    return None
+                data = sample.payload.to_bytes()
+                if data == _WAKE_UP:
+                    continue
+                try:
+                    return codec.decode(self._heard[sender], self._run, sender, data)
+                except RefusedMessage as refusal:
+                    self.counters.refuse(sender, refusal.reason)
+        finally:
+            self._wait = None
+
+    def ask_estimate(self, name: str, timeout_s: float) -> EstimateMessage | None:
+        """A linked node's latest estimate, from which a node that returns goes on; None without an answer."""
+        for reply in self._session.get(keys.estimate(self._run, name), timeout=timeout_s):
+            if reply.ok is not None:
+                try:
+                    return codec.decode_public(EstimateMessage, reply.ok.payload.to_bytes())
+                except RefusedMessage as refusal:
+                    self.counters.refuse(name, refusal.reason)
+        return None
+
+    def close(self) -> None:
+        """Leaves the network, within seconds whatever the others do."""
+        self._closed.set()
+        sessions.close(self._session)
+
+    def _declare_inbox(self, sender: str, kind: type[PeerMessage]) -> _Inbox:
+        key = _KEYS[kind](self._run, sender)
+        return self._session.declare_subscriber(key, zenoh.handlers.RingChannel(_DEPTHS[kind]))
+
+    def _declare_orders(self) -> None:
+        """Hears orders to the run, and answers those who ask for the latest status and estimate."""
+        self._session.declare_subscriber(keys.control(self._run), zenoh.handlers.Callback(self._on_order))
+        for key in (keys.status(self._run, self._name), keys.estimate(self._run, self._name)):
+            self._session.declare_queryable(key, zenoh.handlers.Callback(self._answer))
+
+    def _on_order(self, sample: zenoh.Sample) -> None:
+        self._orders.put(sample.payload.to_bytes())
+
+    def _answer(self, query: zenoh.Query) -> None:
+        with query:
+            key = str(query.key_expr)
+            if key in self._latest:
+                query.reply(key, self._latest[key])
+
+    def _declare_publishers(self, *, drop_late_pixels: bool) -> dict[type, zenoh.Publisher]:
+        run, name = self._run, self._name
+        publish = partial(self._session.declare_publisher, allowed_destination=Locality.REMOTE)
+        rounds = partial(
+            publish, congestion_control=CongestionControl.BLOCK, priority=Priority.REAL_TIME, express=True
+        )
+        public = partial(publish, congestion_control=CongestionControl.BLOCK)
+        pixels_control = CongestionControl.DROP if drop_late_pixels else CongestionControl.BLOCK
+        return {
+            ConsensusMessage: rounds(keys.consensus(run, name)),
+            ConfirmMessage: rounds(keys.confirm(run, name)),
+            PixelsMessage: publish(
+                keys.pixels(run, name), congestion_control=pixels_control, priority=Priority.DATA_LOW
+            ),
+            EstimateMessage: public(keys.estimate(run, name), encoding=_ENCODINGS[EstimateMessage]),
+            StatusMessage: public(keys.status(run, name), encoding=_ENCODINGS[StatusMessage]),
+        }
+
+    def _declare_liveliness(self) -> None:
+        self._session.liveliness().declare_subscriber(
+            keys.alive(self._run), zenoh.handlers.Callback(self._on_liveliness), history=True
+        )
+
+    def _on_liveliness(self, sample: zenoh.Sample) -> None:
+        try:
+            name = keys.node_of(str(sample.key_expr))
+        except ValueError:  # somebody else's token
+            return
+        with self._alive_changed:
+            if sample.kind == zenoh.SampleKind.PUT:
+                self._alive.add(name)
+            else:
+                self._alive.discard(name)
+                self._wake(name)
+            self._alive_changed.notify_all()
+
+    def _watch(self) -> None:
+        """Wakes the waiting node when its time is up."""
+        woken = None
+        while not self._closed.wait(_WATCH_PERIOD_S):
+            wait = self._wait
+            if wait is None or wait is woken:
+                continue
+            sender, deadline = wait
+            if time.monotonic() >= deadline:
+                woken = wait
+                self._wake(sender)
+
+    def _wake(self, sender: str) -> None:
+        """Puts an empty message into a sender's inbox, for whoever waits there."""
+        if sender not in self._inboxes:
+            return
+        key = _KEYS[self._heard[sender]](self._run, sender)
+        with contextlib.suppress(zenoh.ZError):  # the session is closing: nobody waits any more
+            self._session.put(key, _WAKE_UP, allowed_destination=Locality.SESSION_LOCAL)
+
+
+def publish(session: zenoh.Session, run: str, message: ControlMessage | TruthMessage) -> None:
+    """Publishes a message about a whole run, from outside the nodes."""
+    key = keys.control(run) if isinstance(message, ControlMessage) else keys.truth(run)
+    session.put(
+        key,
+        codec.encode_public(message),
+        encoding=_ENCODINGS[type(message)],
+        congestion_control=CongestionControl.BLOCK,
+    )
