@@ -1,0 +1,80 @@
+"""The central node: collects every camera's pixels and runs the centralised particle filter (CPF).
+
+Sans-I/O: it is given pictures and losses, and returns messages. Source: Jing & Chen, section 2.1.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import UInt8
+
+from network.messages import ConfirmMessage, EstimateMessage, PixelsMessage
+from nodes.estimator import SirEstimator
+from nodes.filtering.observation import ObservationModel
+from nodes.setup import TrackingSetup
+
+Outgoing = tuple[ConfirmMessage | EstimateMessage, ...]
+
+MAX_AHEAD = 4
+"""Frames ahead of its own whose pictures the central node keeps; no sender can fill its memory."""
+
+
+class Central:
+    """The sink of all pictures."""
+
+    def __init__(self, name: str, models: Mapping[str, ObservationModel], setup: TrackingSetup) -> None:
+        """A central node before its first frame.
+
+        Args:
+            name: Name of the node.
+            models: The observation model of each camera.
+            setup: What the run tracks.
+        """
+        self.name = name
+        self._cameras = set(models)
+        self._estimator = SirEstimator(name, "cpf", models.values(), setup)
+        self._images: dict[int, dict[str, UInt8[np.ndarray, "H W 3"]]] = {}
+        self._newest = dict.fromkeys(models, -1)
+        self._frame = 0
+
+    def on_message(self, message: PixelsMessage) -> Outgoing:
+        """A camera's picture has come: of this frame, or of one soon after if the camera had to skip some."""
+        if message.sender in self._cameras and 0 <= message.frame - self._frame <= MAX_AHEAD:
+            self._newest[message.sender] = message.frame
+            self._images.setdefault(message.frame, {})[message.sender] = message.image
+        return self._if_complete()
+
+    def on_lost(self, camera: str) -> Outgoing:
+        """A camera is gone: the filter goes on with the others."""
+        self._cameras.discard(camera)
+        return self._if_complete()
+
+    def on_deadline(self) -> Outgoing:
+        """The frame's time is up: goes on with the pictures that have come."""
+        return self._step()
+
+    @property
+    def cameras(self) -> frozenset[str]:
+        """The cameras that are still there."""
+        return frozenset(self._cameras)
+
+    @property
+    def frame(self) -> int:
+        """The frame whose pictures it is collecting."""
+        return self._frame
+
+    @property
+    def waiting_for(self) -> tuple[str, ...]:
+        """Cameras whose picture of the frame may still come."""
+        return tuple(sorted(name for name in self._cameras if self._newest[name] < self._frame))
+
+    def _if_complete(self) -> Outgoing:
+        return self._step() if self._cameras and not self.waiting_for else ()
+
+    def _step(self) -> Outgoing:
+        frame = self._frame
+        images = dict(sorted(self._images.pop(frame, {}).items()))
+        self._frame = frame + 1
+        begun = frame > 0
+        estimate = self._estimator.step(frame, images) if begun else self._estimator.begin(images)
+        return ConfirmMessage(self.name, frame), estimate

@@ -1,0 +1,1 @@
+"""The mathematics of the filters: arrays in, arrays out, randomness passed in."""

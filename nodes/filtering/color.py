@@ -1,0 +1,95 @@
+"""Colours: from pixels to histogram bins, with the camera's gain taken out.
+
+Sources: Jing & Chen, Eq. 7-8 (a histogram of each channel); Truong & Kim (2017), Eq. 10 (joint RGB).
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from pydantic import Field
+
+from network.options import Options
+
+GAIN_GRID_PX = 16
+"""Every sixteenth pixel of every sixteenth line is enough for a median."""
+
+
+class ColorOptions(Options):
+    """Which colours are told apart, and in which parts of the target."""
+
+    space: Literal["rgb", "joint_rgb"] = "rgb"
+    """`rgb`: a histogram of each channel (Eq. 7-8); `joint_rgb`: one of the three together."""
+    bins_per_channel: int = Field(default=8, ge=2, le=16)
+    """Bins along each channel: 8 make 3 x 8 bins in `rgb` and 512 in `joint_rgb`."""
+    parts: tuple[float, ...] = (1.0,)
+    """Heights of the target's parts from top to bottom, as fractions that add up to 1; each has its own
+    histogram."""
+    part_weights: tuple[float, ...] = (1.0,)
+    """How much each part counts in the distance; adds up to 1."""
+    gain_correction: bool = False
+    """Whether each channel's gain is brought back to that of the camera's first picture."""
+
+    @property
+    def n_channels(self) -> int:
+        """Histograms of a part: one a channel, or one."""
+        return 3 if self.space == "rgb" else 1
+
+    @property
+    def n_bins(self) -> int:
+        """Bins of a histogram."""
+        return self.bins_per_channel if self.space == "rgb" else self.bins_per_channel**3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GainReference:
+    """A camera's first picture on a sparse grid: what its gain is measured against."""
+
+    pixels: UInt8[np.ndarray, "h w 3"]
+
+
+def gain_reference(image: UInt8[np.ndarray, "H W 3"]) -> GainReference:
+    """Keeps what `channel_gain` needs of a picture."""
+    return GainReference(_sparse(image).copy())
+
+
+def channel_gain(image: UInt8[np.ndarray, "H W 3"], reference: GainReference) -> Float[np.ndarray, " 3"]:
+    """How much brighter each channel is than in the reference: median ratio of well exposed pixels."""
+    now, then = _sparse(image).reshape(-1, 3), reference.pixels.reshape(-1, 3)
+    exposed = ((now > 15) & (now < 250) & (then > 15) & (then < 250)).all(axis=1)
+    if np.count_nonzero(exposed) < 16:
+        return np.ones(3)
+    return np.median((now[exposed] + 1.0) / (then[exposed] + 1.0), axis=0)
+
+
+def _sparse(image: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "h w 3"]:
+    return image[GAIN_GRID_PX // 2 :: GAIN_GRID_PX, GAIN_GRID_PX // 2 :: GAIN_GRID_PX]
+
+
+def quantize(
+    image: UInt8[np.ndarray, "H W 3"], options: ColorOptions, gain: Float[np.ndarray, " 3"]
+) -> Int[np.ndarray, "C H W"]:
+    """The bin of every pixel in each of the C histograms of a part.
+
+    Args:
+        image: Blue, green, red (OpenCV's order).
+        options: Space and number of bins.
+        gain: Gain of each channel, divided out before binning.
+
+    Returns:
+        Bin indices from 0 to n_bins - 1: the channels red, green, blue in `rgb`; in `joint_rgb`
+        r·b² + g·b + b for b bins a channel (Truong & Kim, Eq. 10).
+    """
+    n = options.bins_per_channel
+    # bin = floor(n · value / 256), of the value without its gain
+    values = np.arange(256)[:, None] / gain
+    bins = np.minimum(values * n / 256, n - 1).astype(np.uint8)
+    binned = cv2.LUT(image, bins[None])
+    blue, green, red = cv2.split(binned)
+    if options.space == "rgb":
+        return np.stack([red, green, blue])
+    if n**3 <= 256:
+        return (red * np.uint8(n * n) + green * np.uint8(n) + blue)[None]
+    return (red * np.uint16(n * n) + green * np.uint16(n) + blue)[None]

@@ -1,0 +1,128 @@
+"""Gaussians in moment and information form, and what a camera adds to what was known before.
+
+Sources: Jing & Chen, Eq. 9-10, 13-14 (moments) and 15-16 (information form); the net information is
+p⁻¹ - r⁻¹ of Eq. 17, kept a density by projection to the positive semidefinite cone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moments:
+    """A Gaussian by its mean and covariance."""
+
+    mean: Float[np.ndarray, " D"]
+    covariance: Float[np.ndarray, "D D"]
+
+    def position(self) -> "Moments":
+        """The marginal of the position, the first half of the state."""
+        half = len(self.mean) // 2
+        return Moments(self.mean[:half], self.covariance[:half, :half])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Information:
+    """A Gaussian factor exp(-½ xᵀ Λ x + xᵀ η) by its information matrix Λ and information vector η."""
+
+    matrix: Float[np.ndarray, "D D"]
+    vector: Float[np.ndarray, " D"]
+
+
+def moments(states: Float[np.ndarray, "N D"], weights: Float[np.ndarray, " N"]) -> Moments:
+    """Weighted mean and covariance of a sample (Eq. 9-10 and 13-14)."""
+    # u = Σ ωⱼ χⱼ
+    mean = weights @ states
+    # p = Σ ωⱼ (χⱼ - u)(χⱼ - u)ᵀ, centred before the product
+    centered = states - mean
+    covariance = (centered * weights[:, None]).T @ centered
+    return Moments(mean, (covariance + covariance.T) / 2)
+
+
+def to_information(gaussian: Moments, ridge: float) -> Information:
+    """From p and u to p⁻¹ and p⁻¹u, which Eq. 3 averages; `ridge` is added to the diagonal of p."""
+    covariance = gaussian.covariance + ridge * np.eye(len(gaussian.mean))
+    matrix = np.linalg.inv(covariance)
+    matrix = (matrix + matrix.T) / 2
+    return Information(matrix, matrix @ gaussian.mean)
+
+
+def to_moments(information: Information) -> Moments:
+    """From p⁻¹ and p⁻¹u to p and u and p⁻¹u (Eq. 15-16)."""
+    covariance = np.linalg.inv(information.matrix)
+    return Moments(covariance @ information.vector, (covariance + covariance.T) / 2)
+
+
+def log_factor(
+    positions: Float[np.ndarray, "N A"], information: Information, center: Float[np.ndarray, " A"]
+) -> Float[np.ndarray, " N"]:
+    """-½ xᵀΛx + xᵀη of each row, up to a constant; `center`, near the rows, keeps the products small."""
+    y = positions - center
+    vector = information.vector - information.matrix @ center
+    return y @ vector - 0.5 * np.einsum("ni,ij,nj->n", y, information.matrix, y)
+
+
+def net_information(posterior: Moments, predicted: Moments, ridge: float) -> Information:
+    """What a measurement told: N(u, p) / N(v, r) as a factor that never widens.
+
+    p⁻¹ - r⁻¹ of two samples' moments often has negative directions, where the sample grew wider by chance.
+    They say nothing and are left out, in the coordinates in which r is the identity. Where the measurement
+    says nothing at all (u = v, p = r), the result is zero, exactly.
+
+    Args:
+        posterior: u and p of Eq. 13-14.
+        predicted: v and r of Eq. 9-10.
+        ridge: Added to both covariances' diagonals, m².
+    """
+    eye = np.eye(len(predicted.mean))
+    if np.array_equal(posterior.covariance, predicted.covariance):
+        return Information(0.0 * eye, 0.0 * predicted.mean)
+    # r = L Lᵀ, M = Lᵀ p⁻¹ L = V diag(m) Vᵀ
+    L = np.linalg.cholesky(predicted.covariance + ridge * eye)
+    M = L.T @ np.linalg.solve(posterior.covariance + ridge * eye, L)
+    m, V = np.linalg.eigh((M + M.T) / 2)
+    # the directions with m > 1
+    gain = np.where(m > 1, m - 1, 0.0)
+    shift = np.where(m > 1, m, 0.0) * (V.T @ np.linalg.solve(L, posterior.mean - predicted.mean))
+    # Λ = L⁻ᵀ V diag(m - 1)₊ Vᵀ L⁻¹, η = Λ v + L⁻ᵀ V e
+    basis = np.linalg.solve(L.T, V)
+    matrix = (basis * gain) @ basis.T
+    return Information((matrix + matrix.T) / 2, matrix @ predicted.mean + basis @ shift)
+
+
+def fit_log_quadratic(
+    positions: Float[np.ndarray, "N A"],
+    log_likelihoods: Float[np.ndarray, " N"],
+    weights: Float[np.ndarray, " N"],
+) -> Information:
+    """The concave quadratic nearest to a log-likelihood, by weighted least squares over the particles.
+
+    An alternative to the net information that looks at the likelihood itself, not at two samples' moments:
+    its error is that of a regression instead of that of two covariances.
+
+    Args:
+        positions: The particles' positions.
+        log_likelihoods: ℓ of each.
+        weights: Where the fit has to be good; adds up to one.
+    """
+    n_axes = positions.shape[1]
+    center = weights @ positions
+    scale = np.sqrt(weights @ (positions - center) ** 2) + 1e-9
+    y = (positions - center) / scale
+    # ℓ ≈ c + yᵀη - ½ yᵀΛy
+    i, j = np.triu_indices(n_axes)
+    columns = np.column_stack([np.ones(len(y)), y, -np.where(i == j, 0.5, 1.0) * y[:, i] * y[:, j]])
+    root = np.sqrt(weights)[:, None]
+    coefficients = np.linalg.lstsq(columns * root, log_likelihoods * root[:, 0], rcond=None)[0]
+    matrix = np.zeros((n_axes, n_axes))
+    matrix[i, j] = matrix[j, i] = coefficients[1 + n_axes :]
+    # the concave part: directions in which the likelihood falls off
+    curvature, V = np.linalg.eigh(matrix)
+    falls = curvature > 0
+    matrix = (V * np.where(falls, curvature, 0.0)) @ V.T
+    vector = V @ np.where(falls, V.T @ coefficients[1 : 1 + n_axes], 0.0)
+    # back from y to x
+    matrix = matrix / np.outer(scale, scale)
+    return Information(matrix, vector / scale + matrix @ center)

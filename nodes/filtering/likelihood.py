@@ -1,0 +1,72 @@
+"""From distances to log-likelihoods, with a floor for a target that is not seen.
+
+Source: the Gaussian in the Bhattacharyya distance of Pérez et al. (2002), which Jing & Chen's Eq. 12 leaves
+open. Taken literally, a camera that cannot see the target drags everybody away; the miss floor lets it say
+"I do not know" instead.
+"""
+
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import Field
+
+from network.options import Options
+
+
+class LikelihoodOptions(Options):
+    """How much a distance between histograms weighs."""
+
+    form: Literal["literal", "miss_floor"] = "miss_floor"
+    """`literal`: exp(-d²/2σ²) whatever the camera sees; `miss_floor`: never below that of a missed target."""
+    calibration: Literal["fixed", "background"] = "background"
+    """`fixed`: the two constants below; `background`: set at start-up from what surrounds the target."""
+    sigma: float = Field(default=0.1, gt=0)
+    """σ of the likelihood, in units of d (fixed)."""
+    miss_distance: float = Field(default=0.12, gt=0)
+    """d₀²: the squared distance at which the target counts as not seen (fixed)."""
+    background_fraction: float = Field(default=0.4, gt=0)
+    """d₀² as a fraction of the median d² of the target's surroundings (background)."""
+    background_ratio: float = Field(default=10.0, gt=0)
+    """d₀²/σ² (background)."""
+
+
+def log_likelihoods(
+    squared_distance: Float[np.ndarray, " N"],
+    visible: Float[np.ndarray, " N"],
+    miss_distance: float,
+    variance: float,
+    min_visible: float,
+    options: LikelihoodOptions,
+) -> Float[np.ndarray, " N"]:
+    """ℓ of each box.
+
+    Args:
+        squared_distance: d² to the reference.
+        visible: Part of the box inside the picture.
+        miss_distance: d₀².
+        variance: σ².
+        min_visible: Below this part inside the picture the camera has nothing to say.
+        options: The form.
+    """
+    match_term = -squared_distance / (2 * variance)
+    if options.form == "literal":
+        return match_term
+    # ℓ = log(exp(-d²/2σ²) + exp(-d₀²/2σ²)), and the second alone where the box is hardly visible
+    floor = -miss_distance / (2 * variance)
+    return np.where(visible < min_visible, floor, np.logaddexp(match_term, floor))
+
+
+def background_constants(
+    surroundings: Float[np.ndarray, " N"], options: LikelihoodOptions
+) -> tuple[float, float]:
+    """d₀² and σ² from the distances of boxes around the target, which show what it is not.
+
+    Constants tuned on one scene fail on the next; these follow the scene. Where fewer than four boxes can
+    be seen, the fixed constants serve.
+    """
+    if options.calibration == "fixed" or len(surroundings) < 4:
+        return options.miss_distance, options.sigma**2
+    # d₀² = 0.4 median d², σ² = d₀² / 10
+    miss_distance = options.background_fraction * float(np.median(surroundings))
+    return miss_distance, miss_distance / options.background_ratio

@@ -1,0 +1,210 @@
+"""The observation model of one camera: what a picture says about where the target is.
+
+Source: Jing & Chen, Eq. 6-8 and 11-12, on boxes that follow from the camera's geometry. Everything about one
+camera and one picture lives here; nothing about particles' weights does.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from network.options import Options
+from nodes.camera import Camera
+from nodes.filtering.appearance import (
+    Appearance,
+    ModelUpdateOptions,
+    full_codebook,
+    normalize_counts,
+    reference_codebook,
+    squared_distances,
+    update_appearance,
+)
+from nodes.filtering.color import ColorOptions, GainReference, channel_gain, gain_reference, quantize
+from nodes.filtering.histogram import Codebook, SamplingOptions, count
+from nodes.filtering.likelihood import LikelihoodOptions, background_constants, log_likelihoods
+from nodes.filtering.target import TargetOptions, project_boxes, visible_fraction
+
+GOOD_SIGHT = 0.9
+"""Part of the target's box inside the picture from which a camera trusts its own eyes for a reference."""
+
+
+class ObservationOptions(Options):
+    """How a camera measures the target."""
+
+    color: ColorOptions = ColorOptions()
+    sampling: SamplingOptions = SamplingOptions()
+    likelihood: LikelihoodOptions = LikelihoodOptions()
+    model_update: ModelUpdateOptions = ModelUpdateOptions()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A frame with the gain of its channels against the camera's first frame."""
+
+    image: UInt8[np.ndarray, "H W 3"]
+    gain: Float[np.ndarray, " 3"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """What one box shows: its distance to the reference and how much of it is in the picture."""
+
+    squared_distance: float
+    visible: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObservationModel:
+    """z(k) = hist(k) of one camera (Eq. 6).
+
+    Attributes:
+        camera: Where the camera is.
+        target: What it looks for.
+        options: How it measures.
+        gain: The first picture on a sparse grid; None before the first.
+    """
+
+    camera: Camera
+    target: TargetOptions
+    options: ObservationOptions
+    gain: GainReference | None = None
+
+    def with_first(self, image: UInt8[np.ndarray, "H W 3"]) -> "ObservationModel":
+        """The same model, with gains measured against this picture from now on."""
+        return replace(self, gain=gain_reference(image))
+
+    def look(self, image: UInt8[np.ndarray, "H W 3"]) -> Picture:
+        """Takes the gain of a picture, if the options ask for it."""
+        if self.gain is None or not self.options.color.gain_correction:
+            return Picture(image, np.ones(3))
+        return Picture(image, channel_gain(image, self.gain))
+
+    def log_likelihoods(
+        self, picture: Picture, positions: Float[np.ndarray, "N A"], appearance: Appearance | None
+    ) -> Float[np.ndarray, " N"]:
+        """Evaluates log P(z | χ) at each position; flat while the target's looks are not known."""
+        if appearance is None:
+            return np.zeros(len(positions))
+        distance, visible = self.distances(picture, positions, appearance)
+        return log_likelihoods(
+            distance,
+            visible,
+            appearance.miss_distance,
+            appearance.variance,
+            self.options.sampling.min_visible,
+            self.options.likelihood,
+        )
+
+    def distances(
+        self, picture: Picture, positions: Float[np.ndarray, "N A"], appearance: Appearance
+    ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
+        """d² to the reference and visible part of the box at each position."""
+        boxes = project_boxes(positions, self.target, self.camera)
+        return self._box_distances(picture, boxes, appearance.histograms)
+
+    def sight(self, picture: Picture, position: Float[np.ndarray, " A"], appearance: Appearance) -> Sight:
+        """The distance and the visible part at one position."""
+        distance, visible = self.distances(picture, position[None], appearance)
+        return Sight(float(distance[0]), float(visible[0]))
+
+    def sees(
+        self, picture: Picture, position: Float[np.ndarray, " A"], appearance: Appearance | None
+    ) -> bool:
+        """Whether the picture shows the target at a position."""
+        if appearance is None:
+            return False
+        sight = self.sight(picture, position, appearance)
+        min_visible = self.options.sampling.min_visible
+        return sight.visible >= min_visible and sight.squared_distance < appearance.miss_distance
+
+    def histograms(self, picture: Picture, position: Float[np.ndarray, " A"]) -> Float[np.ndarray, "P C B"]:
+        """Normalised histograms of the target's box at a position."""
+        boxes = project_boxes(position[None], self.target, self.camera)
+        return self._box_histograms(picture, boxes)
+
+    def first_appearance(self, picture: Picture, position: Float[np.ndarray, " A"]) -> Appearance | None:
+        """The reference at the target's known position, or None where its box is not well in the picture."""
+        boxes = project_boxes(position[None], self.target, self.camera)
+        if visible_fraction(boxes, self.camera)[0] < GOOD_SIGHT:
+            return None
+        histograms = self._box_histograms(picture, boxes)
+        # What surrounds the target tells how near a look-alike comes.
+        distance, visible = self._box_distances(picture, surrounding_boxes(boxes[0]), histograms)
+        miss_distance, variance = background_constants(distance[visible > 0.7], self.options.likelihood)
+        return Appearance(histograms, histograms, miss_distance, variance, own=True)
+
+    def updated(
+        self, picture: Picture, position: Float[np.ndarray, " A"], appearance: Appearance
+    ) -> Appearance:
+        """The reference after the frame's estimate: Eq. 4, and a first look of one's own."""
+        if not appearance.own:
+            return self._first_look(picture, position, appearance)
+        if self.options.model_update.alpha == 0:
+            return appearance
+        sight = self.sight(picture, position, appearance)
+        return update_appearance(
+            appearance,
+            self.histograms(picture, position),
+            sight.squared_distance,
+            sight.visible,
+            self.options.model_update,
+        )
+
+    def _first_look(
+        self, picture: Picture, position: Float[np.ndarray, " A"], appearance: Appearance
+    ) -> Appearance:
+        """Its own reference in place of the neighbours', at the first good sight of the target."""
+        sight = self.sight(picture, position, appearance)
+        if sight.visible < GOOD_SIGHT or sight.squared_distance > 0.7 * appearance.miss_distance:
+            return appearance
+        return self.first_appearance(picture, position) or appearance
+
+    def _box_histograms(
+        self, picture: Picture, boxes: Float[np.ndarray, "1 4"]
+    ) -> Float[np.ndarray, "P C B"]:
+        color = self.options.color
+        counts, pixels = self._count(picture, boxes, full_codebook(color))
+        return normalize_counts(counts[0], pixels[0], color)
+
+    def _box_distances(
+        self, picture: Picture, boxes: Float[np.ndarray, "N 4"], reference: Float[np.ndarray, "P C B"]
+    ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
+        book = reference_codebook(reference, self.options.color)
+        counts, pixels = self._count(picture, boxes, book)
+        distance = squared_distances(counts, pixels, reference, book, self.options.color)
+        return distance, visible_fraction(boxes, self.camera)
+
+    def _count(
+        self, picture: Picture, boxes: Float[np.ndarray, "N 4"], book: Codebook
+    ) -> tuple[np.ndarray, np.ndarray]:
+        # Only the region that the boxes cover is quantised.
+        left, top, right, bottom = covered_region(boxes, self.camera)
+        bins = quantize(picture.image[top:bottom, left:right], self.options.color, picture.gain)
+        return count(bins, boxes - np.array([left, top, left, top]), book, self.options.sampling)
+
+
+def covered_region(boxes: Float[np.ndarray, "N 4"], camera: Camera) -> tuple[int, int, int, int]:
+    """left, top, right, bottom of the part of the picture that the boxes cover; at least one pixel."""
+    size = np.array([camera.width_px, camera.height_px])
+    pictured: Bool[np.ndarray, " N"] = visible_fraction(boxes, camera) > 0
+    if not pictured.any():
+        return 0, 0, 1, 1
+    low = np.clip(np.floor(boxes[pictured, :2].min(axis=0)), 0, size - 1).astype(int)
+    high = np.clip(np.ceil(boxes[pictured, 2:].max(axis=0)), low + 1, size).astype(int)
+    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+
+
+def surrounding_boxes(box: Float[np.ndarray, " 4"]) -> Float[np.ndarray, "N 4"]:
+    """Boxes of the same size on three rings around a box, none of which overlaps it."""
+    center, size = (box[:2] + box[2:]) / 2, box[2:] - box[:2]
+    angles = np.arange(12) * np.pi / 6
+    # rings of 1.5, 2.5 and 4 box widths, flattened to the part of the picture where a target could be
+    offsets = np.concatenate(
+        [
+            ring * size[0] * np.stack([np.cos(angles), 0.5 * np.sin(angles)], axis=1)
+            for ring in (1.5, 2.5, 4.0)
+        ]
+    )
+    centers = center + offsets
+    return np.concatenate([centers - size / 2, centers + size / 2], axis=1)

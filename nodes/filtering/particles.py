@@ -1,0 +1,103 @@
+"""Weighted particles: normalisation in the log domain, effective sample size, systematic resampling.
+
+Source: Arulampalam et al., "A tutorial on particle filters" (2002), Algorithms 2 and 4.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Particles:
+    """A weighted sample of the target's state.
+
+    Attributes:
+        states: One row a particle.
+        log_weights: Normalised: their exponentials add up to one.
+    """
+
+    states: Float[np.ndarray, "N D"]
+    log_weights: Float[np.ndarray, " N"]
+
+    @property
+    def positions(self) -> Float[np.ndarray, "N A"]:
+        """The position part of the states."""
+        return self.states[:, : self.states.shape[1] // 2]
+
+    @property
+    def weights(self) -> Float[np.ndarray, " N"]:
+        """The weights themselves."""
+        return np.exp(self.log_weights)
+
+
+def sample_gaussian(
+    mean: Float[np.ndarray, " D"],
+    standard_deviation: Float[np.ndarray, " D"],
+    n_particles: int,
+    rng: np.random.Generator,
+) -> Particles:
+    """Equally weighted particles around a start."""
+    states = mean + standard_deviation * rng.standard_normal((n_particles, len(mean)))
+    return Particles(states, uniform_log_weights(n_particles))
+
+
+def uniform_log_weights(n_particles: int) -> Float[np.ndarray, " N"]:
+    """log(1/n) for each of n particles."""
+    return np.full(n_particles, -np.log(n_particles))
+
+
+def normalize(log_weights: Float[np.ndarray, " N"]) -> tuple[Float[np.ndarray, " N"], float]:
+    """Normalises weights in the log domain.
+
+    Returns:
+        The normalised log weights and the log of the sum that was divided out (the log evidence of a
+        reweighting). Where every weight is zero, nothing was learnt: uniform weights and -inf.
+    """
+    peak = log_weights.max()
+    if not np.isfinite(peak):
+        return uniform_log_weights(len(log_weights)), -np.inf
+    log_sum = peak + np.log(np.exp(log_weights - peak).sum())
+    return log_weights - log_sum, float(log_sum)
+
+
+def reweight(particles: Particles, log_factors: Float[np.ndarray, " N"]) -> Particles:
+    """Multiplies the weights by factors given as logarithms, and normalises (Eq. 12)."""
+    # A flat likelihood says nothing, and changes nothing to the last bit.
+    if np.all(log_factors == log_factors[0]):
+        return particles
+    # ω(k) ∝ ω(k-1) · factor
+    log_weights, _ = normalize(particles.log_weights + log_factors)
+    return Particles(particles.states, log_weights)
+
+
+def effective_sample_size(particles: Particles) -> float:
+    """1 / Σ ω²: how many equally weighted particles the sample is worth."""
+    return float(np.exp(-np.logaddexp.reduce(2 * particles.log_weights)))
+
+
+def systematic_indices(weights: Float[np.ndarray, " N"], offset: float) -> Int[np.ndarray, " N"]:
+    """Systematic resampling: one draw in each of N equal strata, all at the same offset.
+
+    Args:
+        weights: Normalised weights.
+        offset: A uniform draw from [0, 1).
+
+    Returns:
+        The ancestor of each new particle; particle i has floor or ceil of N·ωᵢ children.
+    """
+    n = len(weights)
+    cumulative = np.cumsum(weights)
+    # The rounding error of the sum goes to the last particle that has any weight.
+    cumulative[np.flatnonzero(weights)[-1] :] = 1.0
+    return np.searchsorted(cumulative, (np.arange(n) + offset) / n, side="right")
+
+
+def resample_if_degenerate(particles: Particles, ess_threshold: float, rng: np.random.Generator) -> Particles:
+    """Resamples where the effective sample size is below `ess_threshold` times n (Algorithm 1, step 7)."""
+    n = len(particles.log_weights)
+    if effective_sample_size(particles) >= ess_threshold * n:
+        return particles
+    ancestor_indices = systematic_indices(particles.weights, float(rng.random()))
+    return Particles(particles.states[ancestor_indices], uniform_log_weights(n))

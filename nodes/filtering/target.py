@@ -1,0 +1,97 @@
+"""The target: the space that it moves in, its size, its start, and the box that it fills in a picture."""
+
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import Field
+
+from network.options import Options
+from nodes.camera import Camera
+
+
+class StartOptions(Options):
+    """What every filter is told about the target at frame 0."""
+
+    position: tuple[float, ...] | Literal["truth"] = "truth"
+    """Where the target is at frame 0, in metres, or `truth`: where the ground truth has it."""
+    position_error: float = Field(default=0.05, ge=0)
+    """Standard deviation of the error that the seed adds to that position, on each axis, in m."""
+    velocity: tuple[float, ...] = (0.0, 0.0)
+    """Velocity at frame 0, in m/s, one number an axis."""
+    position_deviation: float = Field(default=0.1, gt=0)
+    """Standard deviation of the first particles' positions, in m."""
+    velocity_deviation: float = Field(default=0.15, gt=0)
+    """Standard deviation of the first particles' velocities, in m/s."""
+
+
+class TargetOptions(Options):
+    """What is tracked."""
+
+    space: Literal["plane", "volume"] = "plane"
+    """`plane`: on a horizontal plane, state [x, y, vx, vy]; `volume`: [x, y, z, vx, vy, vz]."""
+    person: str | None = None
+    """Name of the person in the world that is the target; not needed for footage."""
+    plane_height: float = 0.0
+    """Height of the plane above the floor, in m; the target stands on it (people's feet: 0)."""
+    height: float = Field(default=1.75, gt=0)
+    """Height of the target, in m."""
+    width: float = Field(default=0.48, gt=0)
+    """Width of the target, in m."""
+    start: StartOptions = StartOptions()
+    """The target at frame 0."""
+
+    @property
+    def n_axes(self) -> int:
+        """Axes of the position: 2 on a plane, 3 in a volume."""
+        return 2 if self.space == "plane" else 3
+
+
+def project_boxes(
+    positions: Float[np.ndarray, "N A"], target: TargetOptions, camera: Camera
+) -> Float[np.ndarray, "N 4"]:
+    """The box that the target would fill in a camera's picture at each position.
+
+    A box of fixed size would cost a factor of two in accuracy: the size in metres is projected, the height
+    from foot to head and the width at the depth between them.
+
+    Args:
+        positions: Foot points on the plane (2 axes) or centres in the volume (3 axes), metres.
+        target: Space and size.
+        camera: The camera.
+
+    Returns:
+        left, top, right, bottom in pixels, pixel edges at whole numbers; NaN where the target cannot be
+        pictured from there, or would be less than two pixels high.
+    """
+    if target.space == "plane":
+        foot = np.column_stack([positions, np.full(len(positions), target.plane_height)])
+    else:
+        foot = positions - np.array([0.0, 0.0, target.height / 2])
+    head = foot + np.array([0.0, 0.0, target.height])
+    pixels, depth = camera.project(np.concatenate([foot, head]))
+    ends = pixels.reshape(2, -1, 2) + 0.5
+    middle = ends.mean(axis=0)
+    # A slanted view shortens the body but not its depth: a box is at least as high as the head is wide.
+    half_width = 0.5 * camera.K[0, 0] * target.width / np.maximum(depth.reshape(2, -1).mean(axis=0), 1e-6)
+    half_height = np.maximum(0.5 * np.abs(ends[0, :, 1] - ends[1, :, 1]), half_width * MIN_ASPECT)
+    low, high = (
+        middle - np.stack([half_width, half_height], 1),
+        middle + np.stack([half_width, half_height], 1),
+    )
+    boxes = np.concatenate([low, high], axis=1)
+    boxes[~(half_height > 1.0)] = np.nan
+    return boxes
+
+
+MIN_ASPECT = 0.8
+"""Least height of a box in widths: what is left of a person seen from straight above."""
+
+
+def visible_fraction(boxes: Float[np.ndarray, "N 4"], camera: Camera) -> Float[np.ndarray, " N"]:
+    """The part of each box that lies inside the picture, 0 to 1."""
+    size = np.array([camera.width_px, camera.height_px])
+    low, high = boxes[:, :2], boxes[:, 2:]
+    inside = np.clip(np.minimum(high, size) - np.maximum(low, 0.0), 0.0, None)
+    fraction = inside.prod(axis=1) / (high - low).prod(axis=1)
+    return np.nan_to_num(fraction, nan=0.0)

@@ -1,0 +1,223 @@
+"""The shell around a node: the one place that listens, speaks, and looks at the clock.
+
+A node's life is four lines: announce, wait for the start, one frame after the other, leave.
+"""
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from threading import Event
+from typing import Literal
+
+from network.messages import (
+    ConfirmMessage,
+    ConsensusMessage,
+    ControlMessage,
+    EstimateMessage,
+    PixelsMessage,
+)
+from network.transport import Transport
+from nodes.central import Central
+from nodes.smart_camera import SmartCamera
+from nodes.sources import FrameSource
+from nodes.telemetry import Telemetry
+
+AHEAD = 2
+"""Frames that a camera may be ahead of the last one that the sink of its pictures has confirmed."""
+PATIENCE_S = 0.25
+"""How long a wait lasts at most before the shell looks whether it has been told to stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """When frames begin and end.
+
+    Attributes:
+        kind: `lockstep` or `realtime`.
+        rate_hz: Frames a second.
+        deadline_s: In lockstep, how long a frame waits for a message before its sender counts as gone.
+    """
+
+    kind: Literal["lockstep", "realtime"]
+    rate_hz: float
+    deadline_s: float
+
+
+class Shell:
+    """What the shells of a smart camera and of the central node share: start, clock, stop."""
+
+    def __init__(self, name: str, transport: Transport, pace: Pace, frames: int, stopped: Event) -> None:
+        """A shell before the start.
+
+        Args:
+            name: The node.
+            transport: Its way to the others.
+            pace: When frames begin and end.
+            frames: How many there are.
+            stopped: Set from outside when the node is to leave.
+        """
+        self.name, self.transport, self.pace, self.frames = name, transport, pace, frames
+        self.telemetry = Telemetry()
+        self._stopped = stopped
+        self._start_s = 0.0
+
+    def wait_for_start(self, linked: Iterable[str]) -> bool:
+        """Announces the node and waits for the start; False if it is told to leave instead.
+
+        Args:
+            linked: The nodes that it must hear before it says that it is ready.
+        """
+        self.transport.announce()
+        while not self.stopped:
+            missing = self.transport.wait_until_alive(linked, PATIENCE_S)
+            if not missing:
+                # Said again until the start, for a launcher that comes later.
+                self.report("ready", -1, {})
+            order = self.transport.wait_for_control(0 if missing else PATIENCE_S)
+            if order is not None:
+                return self._obey(order)
+        return False
+
+    def _obey(self, order: ControlMessage) -> bool:
+        if order.action == "stop":
+            self._stopped.set()
+            return False
+        self._start_s = order.start_time_s if order.start_time_s is not None else time.time()
+        return True
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the node is to leave."""
+        return self._stopped.is_set()
+
+    def await_frame(self, index: int) -> bool:
+        """Waits for a frame's time; False where it is over already, or the node is to leave."""
+        order = self.transport.wait_for_control(0)
+        if order is not None and order.action == "stop":
+            self._stopped.set()
+        if self.pace.kind == "realtime":
+            early = self._start_s + index / self.pace.rate_hz - time.time()
+            if early < -1 / self.pace.rate_hz and index > 0:
+                self.telemetry.late += 1
+                return False
+            self._stopped.wait(max(0.0, early))
+        return not self.stopped
+
+    def deadline(self, index: int) -> float:
+        """When a frame that begins now has to be done, on the monotonic clock."""
+        if self.pace.kind == "lockstep":
+            return time.monotonic() + self.pace.deadline_s
+        left = self._start_s + (index + 1) / self.pace.rate_hz - time.time()
+        return time.monotonic() + left
+
+    def report(
+        self, state: Literal["ready", "running", "done", "failed"], frame: int, counters: dict[str, int]
+    ) -> None:
+        """Tells everybody how the node is."""
+        self.transport.send(self.telemetry.status(self.name, state, frame, self.transport.counters, counters))
+
+
+def run_camera(
+    node: SmartCamera, source: FrameSource, neighbors: Iterable[str], sink: str | None, shell: Shell
+) -> None:
+    """The life of a smart camera.
+
+    Args:
+        node: The camera.
+        source: Its pictures.
+        neighbors: The nodes that it runs consensus with.
+        sink: The central node, if there is one.
+        shell: Its shell.
+    """
+    first = source.read(0)
+    if not shell.wait_for_start([*neighbors, *([sink] if sink else [])]):
+        return
+    confirmed, done = -1, -1
+    for index in range(shell.frames):
+        if not shell.await_frame(index):
+            if shell.stopped:
+                break
+            continue
+        image = source.read(index) if index else first
+        deadline = shell.deadline(index)
+        # pixels to the central node, which confirms them in lockstep
+        if sink is not None:
+            if shell.pace.kind == "lockstep":
+                confirmed = _await_confirmation(sink, index - AHEAD, confirmed, shell)
+            shell.transport.send(PixelsMessage(node.name, index, image))
+        # local filter
+        began = time.perf_counter()
+        outgoing = node.on_frame(index, image)
+        shell.telemetry.local_filter_s.append(time.perf_counter() - began)
+        # rounds with the neighbours, and the fusion filter at their end
+        began = time.perf_counter()
+        _send(outgoing, shell)
+        _rounds(node, deadline, shell)
+        shell.telemetry.consensus_round_s.append((time.perf_counter() - began) / max(node.rounds_done, 1))
+        done = index
+        if index == 0:
+            shell.report("running", index, dict(node.counters))
+    shell.report("done" if done == shell.frames - 1 else "failed", done, dict(node.counters))
+
+
+def _rounds(node: SmartCamera, deadline: float, shell: Shell) -> None:
+    """Passes messages between the neighbours and the node until the frame is done."""
+    while node.waiting_for and not shell.stopped:
+        neighbor = node.waiting_for[0]
+        left = deadline - time.monotonic()
+        message = shell.transport.receive(neighbor, min(max(left, 0.0), PATIENCE_S))
+        if isinstance(message, ConsensusMessage):
+            _send(node.on_message(message), shell)
+        elif not shell.transport.alive(neighbor):
+            _send(node.on_lost(neighbor), shell)
+        elif left <= 0 and shell.pace.kind == "realtime":
+            shell.telemetry.late += 1
+            _send(node.on_deadline(), shell)
+        elif left <= 0:
+            _send(node.on_lost(neighbor), shell)
+
+
+def _await_confirmation(sink: str, frame: int, confirmed: int, shell: Shell) -> int:
+    """Waits until the sink has confirmed a frame, or is gone; returns the last frame that it has."""
+    limit = time.monotonic() + shell.pace.deadline_s
+    while confirmed < frame and shell.transport.alive(sink) and not shell.stopped:
+        message = shell.transport.receive(sink, PATIENCE_S)
+        if isinstance(message, ConfirmMessage):
+            confirmed = message.frame
+        elif time.monotonic() > limit:
+            break
+    return confirmed
+
+
+def run_central(node: Central, shell: Shell) -> None:
+    """The life of the central node."""
+    if not shell.wait_for_start(node.cameras):
+        return
+    while node.frame < shell.frames and node.cameras and not shell.stopped:
+        index = node.frame
+        shell.await_frame(index)
+        deadline = shell.deadline(index)
+        while node.frame == index and node.cameras and not shell.stopped:
+            if not node.waiting_for:
+                # every picture of the frame has come while the one before was worked on
+                _send(node.on_deadline(), shell)
+                break
+            camera = node.waiting_for[0]
+            left = deadline - time.monotonic()
+            message = shell.transport.receive(camera, min(max(left, 0.0), PATIENCE_S))
+            if isinstance(message, PixelsMessage):
+                began = time.perf_counter()
+                _send(node.on_message(message), shell)
+                if node.frame != index:
+                    shell.telemetry.local_filter_s.append(time.perf_counter() - began)
+            elif not shell.transport.alive(camera):
+                _send(node.on_lost(camera), shell)
+            elif left <= 0:
+                shell.telemetry.late += 1
+                _send(node.on_deadline(), shell)
+    shell.report("done" if node.frame == shell.frames else "failed", node.frame - 1, {})
+
+
+def _send(messages: Iterable[ConsensusMessage | EstimateMessage | ConfirmMessage], shell: Shell) -> None:
+    for message in messages:
+        shell.transport.send(message)

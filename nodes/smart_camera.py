@@ -1,0 +1,202 @@
+"""A smart camera of the network: local filter, consensus, fusion filter.
+
+Sans-I/O: it is given pictures, messages and deadlines, and returns messages. Everything that a frame does to
+a camera lives in this file, in the order in which it happens (Jing & Chen, section 3 and Algorithm 1).
+"""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import UInt8
+
+from network.consensus import Consensus
+from network.messages import ConsensusMessage, EstimateMessage
+from nodes.estimator import SirEstimator
+from nodes.filtering.appearance import Appearance, pack_looks, unpack_looks
+from nodes.filtering.fusion import fuse, is_density, pack, propagate, unpack
+from nodes.filtering.gaussian import Moments, moments
+from nodes.filtering.local import LocalResult, local_filter
+from nodes.filtering.observation import ObservationModel, Picture
+from nodes.filtering.particles import Particles, effective_sample_size, resample_if_degenerate
+from nodes.filtering.sighting import Sighting
+from nodes.setup import TrackingSetup
+
+Outgoing = tuple[ConsensusMessage | EstimateMessage, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameInProgress:
+    """What a camera keeps of a frame while its neighbours' messages come in."""
+
+    index: int
+    image: UInt8[np.ndarray, "H W 3"]
+    picture: Picture
+    predicted: Particles
+
+
+class SmartCamera:
+    """One camera's part of the distributed filter.
+
+    Attributes:
+        name: The camera's name, which is the node's.
+        counters: Frames in which the local (`indefinite_local`) or the fused (`indefinite_fused`) difference
+            of information matrices was not positive semidefinite, so that Eq. 17's ratio was no density.
+    """
+
+    def __init__(
+        self,
+        model: ObservationModel,
+        setup: TrackingSetup,
+        consensus: Consensus,
+        cameras: tuple[str, ...],
+        *,
+        with_single: bool,
+    ) -> None:
+        """A camera before its first frame.
+
+        Args:
+            model: The camera's observation model.
+            setup: What the run tracks.
+            consensus: Its part of the averaging.
+            cameras: The cameras of the network.
+            with_single: Whether to run the camera's own filter beside, as a baseline.
+        """
+        self.name = model.camera.name
+        self.counters: Counter[str] = Counter(indefinite_local=0, indefinite_fused=0)
+        self._model, self._setup, self._consensus, self._cameras = model, setup, consensus, set(cameras)
+        self._motion = setup.motion
+        self._fusion_rng = setup.stream(self.name, "fusion")
+        self._local_rng = setup.stream(self.name, "local")
+        self._particles = setup.first_particles(self._fusion_rng)
+        self._local_particles = setup.first_particles(self._local_rng)
+        self._appearance: Appearance | None = None
+        self._sighting = Sighting()
+        self._frame: FrameInProgress | None = None
+        self._single = SirEstimator(self.name, "single", [model], setup) if with_single else None
+
+    def on_frame(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> Outgoing:
+        """A picture has been taken: filters it and opens the frame's consensus.
+
+        Args:
+            index: The frame, from 0, which initialises the filters.
+            image: The picture, BGR.
+        """
+        if index == 0:
+            return self._begin(image)
+        picture = self._model.look(image)
+        # predict: χ(k) ~ P(χ(k) | χ(k-1))
+        predicted = propagate(self._particles, self._motion, self._fusion_rng)
+        # reweight by the own picture: u, p, v, r
+        local = self._filter_locally(picture, predicted)
+        self.counters["indefinite_local"] += not is_density(local, self._setup.fusion)
+        # exchange (Eq. 3)
+        self._frame = FrameInProgress(index, image, picture, predicted)
+        return self._with_result(self._consensus.begin(index, pack(local, self._setup.fusion)))
+
+    def on_message(self, message: ConsensusMessage) -> Outgoing:
+        """A neighbour's value of a round has come."""
+        return self._with_result(self._consensus.receive(message))
+
+    def on_lost(self, neighbor: str) -> Outgoing:
+        """A neighbour is gone: the rounds go on without it."""
+        self._cameras.discard(neighbor)
+        return self._with_result(self._consensus.drop(neighbor))
+
+    def on_deadline(self) -> Outgoing:
+        """The frame's time is up: what the rounds have reached must do."""
+        self._consensus.cut()
+        return self._with_result(())
+
+    @property
+    def waiting_for(self) -> tuple[str, ...]:
+        """Neighbours without whose message the frame cannot go on; none when it is done."""
+        return self._consensus.waiting_for()
+
+    @property
+    def rounds_done(self) -> int:
+        """Rounds of consensus done in the frame."""
+        return self._consensus.rounds_done
+
+    def _with_result(self, messages: tuple[ConsensusMessage, ...]) -> Outgoing:
+        """The messages of the rounds, and the estimates once the rounds are over."""
+        frame = self._frame
+        if frame is None or not self._consensus.done:
+            return messages
+        self._frame = None
+        estimates = self._finish_first(frame) if frame.index == 0 else self._finish(frame)
+        return (*messages, *estimates)
+
+    def _filter_locally(self, picture: Picture, predicted: Particles) -> LocalResult:
+        """Eq. 9-14 on the fusion filter's particles, or on the local filter's own."""
+        own = self._setup.fusion.local_particles == "own"
+        if own:
+            predicted = propagate(self._local_particles, self._motion, self._local_rng)
+        log_likelihoods = self._model.log_likelihoods(picture, predicted.positions, self._appearance)
+        result = local_filter(predicted, log_likelihoods)
+        if own:
+            threshold = self._setup.filter.resampling.threshold
+            self._local_particles = resample_if_degenerate(result.particles, threshold, self._local_rng)
+        return result
+
+    def _finish(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
+        """The second half of a frame: the fusion filter on the network's average."""
+        setup = self._setup
+        # sum: N times the average (Eq. 15-16)
+        fused = unpack(self._consensus.value, len(self._cameras), len(setup.start.mean), setup.fusion)
+        self.counters["indefinite_fused"] += not fused.is_density
+        # reweight, from the prior or the optimal proposal (Eq. 17)
+        posterior = fuse(
+            self._particles, frame.predicted, fused, self._motion, setup.fusion, self._fusion_rng
+        )
+        # estimate
+        estimate = moments(posterior.states, posterior.weights)
+        prior = moments(frame.predicted.states, frame.predicted.weights)
+        self._sighting = self._sighting.after(prior.position(), estimate.position())
+        message = self._message(frame, estimate, effective_sample_size(posterior))
+        # resample
+        threshold = setup.filter.resampling.threshold
+        self._particles = resample_if_degenerate(posterior, threshold, self._fusion_rng)
+        # update the reference (Eq. 4)
+        if self._appearance is not None:
+            position = estimate.position().mean
+            self._appearance = self._model.updated(frame.picture, position, self._appearance)
+        single = self._single.step(frame.index, {self.name: frame.image}) if self._single else None
+        return (message, single) if single else (message,)
+
+    def _begin(self, image: UInt8[np.ndarray, "H W 3"]) -> Outgoing:
+        """Frame 0: the target's looks, averaged over the cameras that see it at the start."""
+        self._model = self._model.with_first(image)
+        picture = self._model.look(image)
+        position = self._setup.start.moments.position().mean
+        self._appearance = self._model.first_appearance(picture, position)
+        self._frame = FrameInProgress(0, image, picture, self._particles)
+        looks = pack_looks(self._appearance, self._setup.filter.color)
+        return self._with_result(self._consensus.begin(0, looks))
+
+    def _finish_first(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
+        """A camera that saw nothing takes the looks that the others saw."""
+        if self._appearance is None:
+            self._appearance = unpack_looks(self._consensus.value, self._setup.filter.color)
+        n = float(self._setup.filter.n_particles)
+        message = self._message(frame, self._setup.start.moments, n)
+        if self._single is None:
+            return (message,)
+        return message, self._single.begin({self.name: frame.image}, {self.name: self._appearance})
+
+    def _message(self, frame: FrameInProgress, estimate: Moments, ess: float) -> EstimateMessage:
+        position = estimate.position().mean
+        return EstimateMessage(
+            run=self._setup.run,
+            node=self.name,
+            estimator="dcpf",
+            frame=frame.index,
+            time_s=frame.index / self._setup.rate_hz,
+            mean=estimate.mean,
+            covariance=estimate.covariance,
+            visible=self._model.sees(frame.picture, position, self._appearance),
+            lost=self._sighting.lost,
+            ess=ess,
+            iterations=self._consensus.rounds_done,
+            members=tuple(sorted(self._cameras)),
+        )
