@@ -1,0 +1,177 @@
+"""Puts a run together: from a resolved scenario to the nodes, their pictures and the truth."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from network.consensus import Consensus
+from network.graph import Graph
+from network.messages import TruthMessage, Visibility
+from network.streams import stream
+from nodes.camera import Camera
+from nodes.central import Central
+from nodes.filtering.observation import ObservationModel
+from nodes.setup import Start, TrackingSetup
+from nodes.smart_camera import SmartCamera
+from nodes.sources import FrameSource
+from sim.footage.ground_truth import read_ground_truth
+from sim.scenario.loading import cameras_of, video_source
+from sim.scenario.model import Scenario
+from sim.scenario.parsing import ScenarioError
+from sim.world.renderer import Renderer
+from sim.world.visibility import visibility
+from sim.world.world import World, build_world
+
+
+class RenderedSource:
+    """The pictures of a camera in the simulated world."""
+
+    def __init__(self, world: World, camera: Camera, rate_hz: float) -> None:
+        """A camera that looks at the world `rate_hz` times a second."""
+        self._renderer = Renderer(world, camera)
+        self._rate_hz = rate_hz
+
+    def read(self, index: int) -> UInt8[np.ndarray, "H W 3"]:
+        """The picture of a frame, BGR."""
+        return self._renderer.frame(index, index / self._rate_hz)
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """Everything that a run needs, worked out from its scenario."""
+
+    scenario: Scenario
+
+    @cached_property
+    def cameras(self) -> Mapping[str, Camera]:
+        """The calibrated cameras."""
+        return cameras_of(self.scenario)
+
+    @cached_property
+    def graph(self) -> Graph:
+        """The communication graph."""
+        return self.scenario.graph
+
+    @cached_property
+    def world(self) -> World | None:
+        """The rendered world, if it is one."""
+        if self.scenario.world is None:
+            return None
+        return build_world(self.scenario.world, self.scenario.seed)
+
+    @cached_property
+    def truth(self) -> Float[np.ndarray, "T D"] | None:
+        """The target's true state in each frame, or None where nobody knows it.
+
+        Raises:
+            ScenarioError: The ground truth is shorter than the run.
+        """
+        n_axes, times = self.scenario.target.n_axes, np.arange(self.scenario.frames) / self.scenario.rate_hz
+        if self.world is not None:
+            person = str(self.scenario.target.person)
+            states = [np.r_[self.world.position(person, t), self.world.velocity(person, t)] for t in times]
+            return np.array(states) if n_axes == 2 else self._in_volume(np.array(states))
+        footage = self.scenario.footage
+        if footage is None or footage.ground_truth is None:
+            return None
+        path = Path(footage.ground_truth)
+        positions = read_ground_truth(path)[footage.first_frame :, :n_axes]
+        if len(positions) < self.scenario.frames:
+            raise ScenarioError(
+                f"{path}: has {len(positions)} frames from first_frame on, the run {self.scenario.frames}:"
+                " take fewer frames"
+            )
+        positions = positions[: self.scenario.frames]
+        velocities = np.gradient(positions, 1 / self.scenario.rate_hz, axis=0)
+        return np.hstack([positions, velocities])
+
+    def _in_volume(self, states: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "T 6"]:
+        """A walking person as a target in a volume: the middle of the body."""
+        half = np.full(len(states), self.scenario.target.height / 2)
+        x, y, vx, vy = states.T
+        return np.stack([x, y, half, vx, vy, np.zeros_like(half)], axis=1)
+
+    @cached_property
+    def start(self) -> Start:
+        """What every filter is told about the target at frame 0.
+
+        Raises:
+            ScenarioError: It should be the truth, and there is none.
+        """
+        options, n_axes = self.scenario.target.start, self.scenario.target.n_axes
+        if options.position == "truth":
+            if self.truth is None:
+                raise ScenarioError(
+                    "target.start.position is truth, but the footage has no ground_truth: give the position"
+                )
+            position = self.truth[0, :n_axes]
+        else:
+            position = np.array(options.position)
+        error = options.position_error * stream(self.scenario.seed, "start").standard_normal(n_axes)
+        deviations = np.repeat([options.position_deviation, options.velocity_deviation], n_axes)
+        return Start(np.r_[position + error, options.velocity], deviations)
+
+    @cached_property
+    def setup(self) -> TrackingSetup:
+        """What every estimator is told."""
+        scenario = self.scenario
+        return TrackingSetup(
+            scenario.name,
+            scenario.seed,
+            scenario.rate_hz,
+            scenario.target,
+            self.start,
+            scenario.filter,
+            scenario.fusion,
+        )
+
+    def model(self, camera: str) -> ObservationModel:
+        """The observation model of a camera."""
+        return ObservationModel(self.cameras[camera], self.scenario.target, self.scenario.filter)
+
+    def smart_camera(self, name: str) -> SmartCamera:
+        """A camera's node."""
+        network = self.scenario.network
+        neighbors = self.graph.neighbors(name)
+        return SmartCamera(
+            self.model(name),
+            self.setup,
+            Consensus(name, neighbors, network.consensus, network.iterations),
+            self.graph.names,
+            with_single=self.scenario.baselines.single,
+        )
+
+    def central(self) -> Central:
+        """The central node."""
+        models = {name: self.model(name) for name in self.cameras}
+        return Central(self.scenario.central.name, models, self.setup)
+
+    def source(self, camera: str) -> FrameSource:
+        """Where a camera's pictures come from.
+
+        Raises:
+            SourceError: Its video cannot be read.
+        """
+        if self.world is not None:
+            return RenderedSource(self.world, self.cameras[camera], self.scenario.rate_hz)
+        return video_source(self.scenario, camera)
+
+    def truth_message(self, frame: int) -> TruthMessage | None:
+        """The truth of a frame, with what each camera sees of the target where the world is rendered."""
+        if self.truth is None:
+            return None
+        time_s = frame / self.scenario.rate_hz
+        seen: dict[str, Visibility] = {}
+        if self.world is not None:
+            person = str(self.scenario.target.person)
+            for name, camera in self.cameras.items():
+                sight = visibility(self.world, camera, person, time_s)
+                seen[name] = Visibility(sight.in_view, sight.occluded)
+        return TruthMessage(self.scenario.name, frame, time_s, self.truth[frame], seen)

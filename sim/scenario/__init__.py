@@ -1,0 +1,1 @@
+"""The scenario: one file that tells a whole run."""

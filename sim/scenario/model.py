@@ -1,0 +1,215 @@
+"""The scenario: what a file can say. It composes the options that stand beside the things they configure."""
+
+from collections.abc import Mapping
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from network.graph import Edge, Graph, complete, grid, path, ring, star
+from network.keys import check_name
+from network.options import Options
+from network.weights import ConsensusOptions
+from nodes.filtering.fusion import FusionOptions
+from nodes.filtering.target import TargetOptions
+from nodes.setup import FilterOptions
+from sim.scenario.presets import PresetName
+from sim.world.world import WorldOptions
+
+Name = Annotated[str, AfterValidator(check_name)]
+Vector3 = tuple[float, float, float]
+
+
+class CameraOptions(Options):
+    """A calibrated camera: by position and look-at point, by K, R and t, or by a calibration file."""
+
+    name: Name
+    """Name of the camera and of its node."""
+    size_px: tuple[int, int] | None = None
+    """Width and height of its pictures."""
+    position: Vector3 | None = None
+    """Its centre, in m, with `look_at` and `focal_px`."""
+    look_at: Vector3 | None = None
+    """A point on its optical axis, in m; the camera stands level."""
+    focal_px: float | None = Field(default=None, gt=0)
+    """Focal length."""
+    K: tuple[Vector3, Vector3, Vector3] | None = None
+    """Intrinsic matrix, in pixels, with `R` and `t`."""
+    R: tuple[Vector3, Vector3, Vector3] | None = None
+    """Rotation from world axes to the camera's (x right, y down, z forward)."""
+    t: Vector3 | None = None
+    """Translation, in m; the camera's centre is -Rᵀt."""
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    """k1, k2, p1, p2, k3 of the lens, in OpenCV's order."""
+    calibration: str | None = None
+    """A calibration file instead: OpenCV's YAML, XML or JSON, or Qualisys' `.qca.txt` (by serial = name)."""
+    video: str | None = None
+    """The camera's video, for footage: a path, relative to the footage's folder."""
+    video_sha256: str | None = None
+    """What the video must hash to; written into the folder of a run."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        looks = [self.position, self.look_at, self.focal_px]
+        matrices = [self.K, self.R, self.t]
+        ways = [any(v is not None for v in way) for way in (looks, matrices)] + [self.calibration is not None]
+        if sum(ways) > 1:
+            raise ValueError(
+                f"camera {self.name} is calibrated in two ways: keep position, look_at and focal_px, or K, R"
+                " and t, or calibration"
+            )
+        if ways[0] and None in looks:
+            raise ValueError(f"camera {self.name} needs position, look_at and focal_px: add what lacks")
+        if ways[1] and None in matrices:
+            raise ValueError(f"camera {self.name} needs K, R and t together: add what lacks")
+        if (ways[0] or ways[1]) and self.size_px is None:
+            raise ValueError(f"camera {self.name} needs size_px: add it, such as size_px: [640, 480]")
+        return self
+
+
+class FootageOptions(Options):
+    """Recorded videos in place of a rendered world."""
+
+    name: str | None = None
+    """Footage that `dcpf footage` fetches."""
+    folder: str | None = None
+    """A folder of one's own, relative to the scenario file, instead."""
+    calibration: str | None = None
+    """Calibration file of all cameras, relative to the footage's folder."""
+    ground_truth: str | None = None
+    """CSV with columns frame, x_m, y_m, z_m, relative to the scenario file."""
+    scale: float = Field(default=1.0, gt=0, le=1)
+    """Size at which the pictures are used, as a fraction of the videos'."""
+    first_frame: int = Field(default=0, ge=0)
+    """Frame of the videos, and of the ground truth, with which the run begins."""
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        if (self.name is None) == (self.folder is None):
+            raise ValueError("footage needs name or folder: what `dcpf footage` fetches, or your own")
+        return self
+
+
+class NetworkOptions(Options):
+    """Who talks to whom, and how they agree."""
+
+    graph: Literal["ring", "path", "star", "complete", "grid"] | tuple[Edge, ...] = "ring"
+    """The communication graph over the cameras in their order, or a list of pairs of their names."""
+    consensus: ConsensusOptions
+    """The averaging."""
+    iterations: int = Field(default=12, ge=0, le=1000)
+    """Rounds of consensus in a frame, t."""
+    deadline_s: float = Field(default=5.0, gt=0)
+    """In lockstep, the time that a frame waits for a neighbour before it goes on without it, in s."""
+    router: str = "tcp/127.0.0.1:7447"
+    """Zenoh endpoint at which the run's router serves the outside."""
+    endpoints: Mapping[Name, str] = Field(default={})
+    """Zenoh endpoints at which nodes listen when they are started by hand; the others take loopback ports."""
+
+
+class CentralOptions(Options):
+    """The central node."""
+
+    name: Name = "central"
+    """Its name."""
+
+
+class BaselineOptions(Options):
+    """What DCPF is compared with."""
+
+    cpf: bool = True
+    """The centralised particle filter, at the central node, on every camera's pixels."""
+    single: bool = True
+    """Each camera's filter on its own."""
+
+
+class Scenario(Options):
+    """A camera network, what it looks at, and how it tracks."""
+
+    name: Name
+    """Name of the scenario, and of its runs unless they are given another."""
+    preset: PresetName = "robust"
+    """`paper`: the filter as printed; `robust`: the one to use. Fills what the file leaves unsaid."""
+    frames: int = Field(ge=2, le=1_000_000)
+    """Frames of a run; frame 0 is the initialisation."""
+    rate_hz: float = Field(gt=0)
+    """Frames a second."""
+    seed: int = Field(default=0, ge=0)
+    """Everything random comes from it."""
+    pace: Literal["lockstep", "realtime"] = "lockstep"
+    """`lockstep`: a frame begins when the one before is done; `realtime`: at its time, whatever is done."""
+    world: WorldOptions | None = None
+    """The rendered world, or"""
+    footage: FootageOptions | None = None
+    """the recorded one."""
+    target: TargetOptions
+    """What is tracked."""
+    cameras: tuple[CameraOptions, ...] = Field(min_length=1)
+    """The smart cameras, in the order of the graph."""
+    network: NetworkOptions
+    """Who talks to whom."""
+    filter: FilterOptions = FilterOptions()
+    """The particle filters."""
+    fusion: FusionOptions = FusionOptions()
+    """How the cameras' results become one."""
+    central: CentralOptions = CentralOptions()
+    """The central node."""
+    baselines: BaselineOptions = BaselineOptions()
+    """What DCPF is compared with."""
+
+    @model_validator(mode="after")
+    def _world_or_footage(self) -> Self:
+        if (self.world is None) == (self.footage is None):
+            raise ValueError("a scenario needs world or footage, one of them: add or remove one")
+        return self
+
+    @model_validator(mode="after")
+    def _names(self) -> Self:
+        names = [camera.name for camera in self.cameras]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"cameras has two named {name}: give each its own name")
+        if self.central.name in names:
+            raise ValueError(f"central.name is {self.central.name}, as is a camera: give it another name")
+        return self
+
+    @model_validator(mode="after")
+    def _target(self) -> Self:
+        target = self.target
+        if self.world is not None:
+            people = [person.name for person in self.world.people]
+            if target.person not in people:
+                raise ValueError(
+                    f"target.person is {target.person}, who is not in world.people:"
+                    f" name one of {', '.join(people)}"
+                )
+        for key, vector in (("velocity", target.start.velocity), ("position", target.start.position)):
+            if vector != "truth" and len(vector) != target.n_axes:
+                raise ValueError(
+                    f"target.start.{key} has {len(vector)} numbers: a target in a {target.space} needs"
+                    f" {target.n_axes}"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _network(self) -> Self:
+        graph = self.graph
+        graph.require_connected()
+        self.network.consensus.require_convergence(graph.max_degree)
+        return self
+
+    @property
+    def graph(self) -> Graph:
+        """The communication graph over the cameras."""
+        names = [camera.name for camera in self.cameras]
+        if isinstance(self.network.graph, str):
+            return GRAPHS[self.network.graph](names)
+        return Graph.from_edges(names, self.network.graph)
+
+    @property
+    def n_processes(self) -> int:
+        """Processes of a run: cameras, the central node if there is one, and the router."""
+        return len(self.cameras) + self.baselines.cpf + 1
+
+
+GRAPHS = {"ring": ring, "path": path, "star": star, "complete": complete, "grid": grid}
+"""The graphs that a scenario can name."""
