@@ -1,0 +1,1 @@
+"""Runs: in processes or in one, recorded, measured and summed up."""

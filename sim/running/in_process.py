@@ -1,0 +1,78 @@
+"""A whole run in one process and one thread: the same nodes, their messages in memory.
+
+Node for node and bit for bit what the processes compute, without their start; the way to run many.
+"""
+
+import time
+from collections.abc import Iterable, Iterator, Mapping
+
+from network.memory import MemoryNetwork
+from network.messages import (
+    ConsensusMessage,
+    EstimateMessage,
+    Message,
+    PixelsMessage,
+    StatusMessage,
+    TruthMessage,
+)
+from network.transport import links_of
+from nodes.central import Central
+from nodes.smart_camera import SmartCamera
+from nodes.telemetry import Telemetry
+from sim.assembly import Assembly
+
+Told = EstimateMessage | TruthMessage | StatusMessage
+"""What a run tells the outside."""
+Nodes = Mapping[str, SmartCamera | Central]
+"""The nodes of a run by name."""
+
+
+def run_in_process(assembly: Assembly) -> Iterator[Told]:
+    """Runs a scenario and yields what it would publish, frame after frame.
+
+    Raises:
+        SourceError: A video cannot be read.
+    """
+    scenario = assembly.scenario
+    cameras = {name: assembly.smart_camera(name) for name in sorted(assembly.cameras)}
+    sources = {name: assembly.source(name) for name in cameras}
+    central = assembly.central() if scenario.baselines.cpf else None
+    nodes: Nodes = {**cameras, central.name: central} if central else cameras
+    network = MemoryNetwork(scenario.name, links_of(assembly.graph, [central.name] if central else []))
+    telemetry = {name: Telemetry() for name in nodes}
+    for frame in range(scenario.frames):
+        for name, camera in cameras.items():
+            image = sources[name].read(frame)
+            if central is not None:
+                network.post(name, PixelsMessage(name, frame, image))
+            began = time.perf_counter()
+            outgoing = camera.on_frame(frame, image)
+            telemetry[name].local_filter_s.append(time.perf_counter() - began)
+            yield from _speak(network, name, outgoing)
+        yield from _converse(network, nodes)
+        truth = assembly.truth_message(frame)
+        if truth is not None:
+            yield truth
+    for name in nodes:
+        counters = cameras[name].counters if name in cameras else {}
+        yield telemetry[name].status(name, "done", scenario.frames - 1, network.counters[name], counters)
+    for source in sources.values():
+        source.close()
+
+
+def _converse(network: MemoryNetwork, nodes: Nodes) -> Iterator[EstimateMessage]:
+    """Delivers messages, and what they bring forth, until nothing is on its way."""
+    while (delivered := network.deliver()) is not None:
+        receiver, message = delivered
+        node = nodes[receiver]
+        if isinstance(node, SmartCamera) and isinstance(message, ConsensusMessage):
+            yield from _speak(network, receiver, node.on_message(message))
+        elif isinstance(node, Central) and isinstance(message, PixelsMessage):
+            yield from _speak(network, receiver, node.on_message(message))
+
+
+def _speak(network: MemoryNetwork, sender: str, messages: Iterable[Message]) -> Iterator[EstimateMessage]:
+    for message in messages:
+        network.post(sender, message)
+        if isinstance(message, EstimateMessage):
+            yield message

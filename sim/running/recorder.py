@@ -1,0 +1,167 @@
+"""The folder of a run: written as the run goes, readable at any moment, the summary whole or not at all."""
+
+import json
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Self, TextIO
+
+from network.codec import decode_public, encode_public
+from network.errors import RefusedMessage
+from network.messages import EstimateMessage, StatusMessage, TruthMessage
+from sim.running.results import Results, Track
+from sim.scenario.document import dump
+from sim.scenario.loading import load_scenario
+from sim.scenario.model import Scenario
+
+ESTIMATORS = ("dcpf", "cpf", "single")
+"""The order of a frame's estimates in the file, then by node: the same whatever order they came in."""
+
+
+class RecordingError(Exception):
+    """The folder of a run cannot be written or read; the text names it and says what to do."""
+
+
+def default_folder(scenario: Scenario, root: Path = Path("runs")) -> Path:
+    """A folder for a run that begins now."""
+    return root / f"{scenario.name}-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
+
+
+def expected_tracks(scenario: Scenario) -> set[Track]:
+    """Who will tell estimates in each frame."""
+    cameras = [camera.name for camera in scenario.cameras]
+    tracks = {("dcpf", name) for name in cameras}
+    if scenario.baselines.single:
+        tracks |= {("single", name) for name in cameras}
+    if scenario.baselines.cpf:
+        tracks.add(("cpf", scenario.central.name))
+    return tracks
+
+
+class Recorder:
+    """Writes a run into its folder; estimates in one order, whatever order they come in."""
+
+    def __init__(self, folder: Path, scenario: Scenario) -> None:
+        """Makes the folder and begins its files.
+
+        Args:
+            folder: Where; an earlier run in it is replaced.
+            scenario: As run.
+
+        Raises:
+            RecordingError: It cannot be written.
+        """
+        self.folder = folder
+        self._expected = expected_tracks(scenario)
+        self._waiting: dict[int, dict[Track, EstimateMessage]] = {}
+        self._next = 0
+        try:
+            (folder / "logs").mkdir(parents=True, exist_ok=True)
+            with suppress(FileNotFoundError):
+                (folder / "summary.json").unlink()
+            dump(scenario.model_dump(mode="json", exclude_none=True), folder / "scenario.yaml")
+            self._files: dict[str, TextIO] = {
+                name: (folder / f"{name}.jsonl").open("w", encoding="utf-8")
+                for name in ("estimates", "truth", "events")
+            }
+        except OSError as error:
+            raise _cannot_write(folder, error) from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def add(self, message: EstimateMessage | TruthMessage | StatusMessage) -> None:
+        """Records what a node, or the world, has told.
+
+        Raises:
+            RecordingError: The disk is full, or the folder gone.
+        """
+        if isinstance(message, TruthMessage):
+            self._write("truth", encode_public(message).decode())
+        elif isinstance(message, EstimateMessage):
+            track = (message.estimator, message.node)
+            self._waiting.setdefault(message.frame, {})[track] = message
+            self._write_complete()
+
+    def event(self, event: str, node: str, **details: Any) -> None:
+        """Records that something happened to a node."""
+        self._write("events", json.dumps({"event": event, "node": node, **details}))
+
+    def forget(self, node: str) -> None:
+        """A node is gone: nobody waits for its estimates any more."""
+        self._expected = {(kind, name) for kind, name in self._expected if name != node}
+        self._write_complete()
+
+    def finish(self, summary: dict[str, Any]) -> None:
+        """Writes what is left and the summary.
+
+        Raises:
+            RecordingError: The disk is full, or the folder gone.
+        """
+        self._write_frames(sorted(self._waiting))
+        part = self.folder / "summary.json.part"
+        try:
+            part.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+            os.replace(part, self.folder / "summary.json")
+        except OSError as error:
+            raise _cannot_write(self.folder, error) from error
+
+    def close(self) -> None:
+        """Writes what is left and closes the files."""
+        with suppress(RecordingError):
+            self._write_frames(sorted(self._waiting))
+        for file in self._files.values():
+            with suppress(OSError):
+                file.close()
+
+    def _write_complete(self) -> None:
+        """Writes the next frames of which everything has come."""
+        while self._next in self._waiting and self._expected <= self._waiting[self._next].keys():
+            self._write_frames([self._next])
+
+    def _write_frames(self, frames: Iterable[int]) -> None:
+        for frame in frames:
+            tracks = self._waiting.pop(frame)
+            for track in sorted(tracks, key=lambda each: (ESTIMATORS.index(each[0]), each[1])):
+                self._write("estimates", encode_public(tracks[track]).decode())
+            self._next = frame + 1
+
+    def _write(self, name: str, line: str) -> None:
+        file = self._files[name]
+        try:
+            file.write(line + "\n")
+            file.flush()
+        except (OSError, ValueError) as error:
+            raise _cannot_write(self.folder, error) from error
+
+
+def read_run(folder: Path) -> Results:
+    """Reads the folder of a run, finished or not.
+
+    Raises:
+        RecordingError: It is no folder of a run.
+        ScenarioError: Its scenario cannot be read.
+    """
+    if not (folder / "scenario.yaml").is_file():
+        raise RecordingError(f"{folder}: is not the folder of a run: name one that `dcpf run` has written")
+    results = Results(load_scenario(folder / "scenario.yaml"))
+    for name, kind in (("estimates", EstimateMessage), ("truth", TruthMessage)):
+        for line in _lines(folder / f"{name}.jsonl"):
+            # The last line of a run that was cut off may be half a message.
+            with suppress(RefusedMessage):
+                results.add(decode_public(kind, line))
+    return results
+
+
+def _lines(path: Path) -> list[bytes]:
+    return path.read_bytes().splitlines() if path.is_file() else []
+
+
+def _cannot_write(folder: Path, error: Exception) -> RecordingError:
+    cause = error.strerror if isinstance(error, OSError) else str(error)
+    return RecordingError(f"{folder}: the run cannot be recorded there: {cause}: free space, or name another --out")

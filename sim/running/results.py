@@ -1,0 +1,204 @@
+"""What a run has found, collected estimate by estimate, and its summary."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from network.messages import EstimateMessage, StatusMessage, TruthMessage
+from sim.running.metrics import anees, disagreement, is_lost, position_errors, rmse
+from sim.scenario.model import Scenario
+
+Track = tuple[str, str]
+"""An estimator and the node that runs it."""
+
+
+@dataclass(slots=True)
+class Results:
+    """Everything that a run has told.
+
+    Attributes:
+        scenario: The scenario as run.
+        tracks: Each estimator's messages by frame.
+        truth: The truth by frame.
+        statuses: The last status of each node.
+        timing: What the launcher has timed, by the names of the summary.
+    """
+
+    scenario: Scenario
+    tracks: dict[Track, dict[int, EstimateMessage]] = field(default_factory=dict)
+    truth: dict[int, TruthMessage] = field(default_factory=dict)
+    statuses: dict[str, StatusMessage] = field(default_factory=dict)
+    timing: dict[str, float] = field(default_factory=dict)
+
+    def add(self, message: EstimateMessage | TruthMessage | StatusMessage) -> None:
+        """Takes what a node, or the world, has told."""
+        match message:
+            case EstimateMessage():
+                self.tracks.setdefault((message.estimator, message.node), {})[message.frame] = message
+            case TruthMessage():
+                self.truth[message.frame] = message
+            case StatusMessage():
+                self.statuses[message.node] = message
+
+    def means(self, track: Track) -> Float[np.ndarray, "T D"]:
+        """The estimates of a track from frame 0 on; NaN where there is none."""
+        n_states = 2 * self.scenario.target.n_axes
+        missing = np.full(n_states, np.nan)
+        found = self.tracks.get(track, {})
+        return np.array([found[k].mean if k in found else missing for k in range(self.scenario.frames)])
+
+    def covariances(self, track: Track) -> Float[np.ndarray, "T D D"]:
+        """The covariances of a track from frame 0 on; NaN where there is none."""
+        n_states = 2 * self.scenario.target.n_axes
+        missing = np.full((n_states, n_states), np.nan)
+        found = self.tracks.get(track, {})
+        return np.array([found[k].covariance if k in found else missing for k in range(self.scenario.frames)])
+
+    def true_states(self) -> Float[np.ndarray, "T D"] | None:
+        """The truth from frame 0 on, None where nobody knows it."""
+        if not self.truth:
+            return None
+        missing = np.full(2 * self.scenario.target.n_axes, np.nan)
+        return np.array(
+            [self.truth[k].mean if k in self.truth else missing for k in range(self.scenario.frames)]
+        )
+
+    def errors(self, track: Track) -> Float[np.ndarray, " T"] | None:
+        """The position error of a track in each frame from 1 on, in metres; None without a truth."""
+        truth = self.true_states()
+        return None if truth is None else position_errors(self.means(track), truth)[1:]
+
+    def of(self, estimator: str) -> dict[str, Track]:
+        """The tracks of an estimator by node, sorted by node."""
+        return {node: (kind, node) for kind, node in sorted(self.tracks) if kind == estimator}
+
+
+def summarize(results: Results, *, processes: int) -> dict[str, Any]:
+    """The run's `summary.json`.
+
+    Args:
+        results: The run.
+        processes: How many processes it took.
+
+    Returns:
+        Plain data; figures that cannot be known, as errors without a truth, are None.
+    """
+    scenario = results.scenario
+    dcpf, single = results.of("dcpf"), results.of("single")
+    cpf = next(iter(results.of("cpf").values()), None)
+    errors = {track: results.errors(track) for track in results.tracks}
+    per_node = {node: _rmse(errors[track]) for node, track in dcpf.items()}
+    all_nodes = [e for track in dcpf.values() if (e := errors[track]) is not None]
+    total = _rmse(np.concatenate(all_nodes)) if all_nodes else None
+    central = _rmse(errors[cpf]) if cpf else None
+    return {
+        "scenario": scenario.name,
+        "preset": scenario.preset,
+        "seed": scenario.seed,
+        "frames": scenario.frames,
+        "cameras": [camera.name for camera in scenario.cameras],
+        "processes": processes,
+        "rmse_m": {
+            "dcpf": total,
+            "cpf": central,
+            "single": {node: _rmse(errors[track]) for node, track in single.items()},
+            "dcpf_per_node": per_node,
+        },
+        "ratio_dcpf_cpf": _number(total / central) if total is not None and central else None,
+        "lost": {
+            "dcpf": _any_lost([errors[track] for track in dcpf.values()]),
+            "cpf": _any_lost([errors[cpf]]) if cpf else None,
+            "single": {node: _any_lost([errors[track]]) for node, track in single.items()},
+        },
+        "disagreement_m": _number(disagreement(np.array([results.means(t)[1:] for t in dcpf.values()])))
+        if dcpf
+        else None,
+        "anees": {
+            "dcpf": _anees(results, list(dcpf.values())),
+            "cpf": _anees(results, [cpf] if cpf else []),
+        },
+        "network": _network(results),
+        "fusion": _fusion(results),
+        "timing": {**results.timing, **_timing(results)},
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _rmse(errors: Float[np.ndarray, " T"] | None) -> float | None:
+    return None if errors is None else _number(rmse(errors))
+
+
+def _any_lost(errors: list[Float[np.ndarray, " T"] | None]) -> bool | None:
+    known = [e for e in errors if e is not None]
+    return any(is_lost(e) for e in known) if known else None
+
+
+def _anees(results: Results, tracks: list[Track]) -> float | None:
+    truth = results.true_states()
+    if truth is None or not tracks:
+        return None
+    return _number(
+        float(np.mean([anees(results.means(t)[1:], results.covariances(t)[1:], truth[1:]) for t in tracks]))
+    )
+
+
+def _network(results: Results) -> dict[str, Any]:
+    """Messages and bytes as the transports counted them, to each receiver, in the mean of the frames."""
+    frames = results.scenario.frames
+    sent, octets = _total(results, "messages"), _total(results, "bytes")
+    return {
+        "iterations": results.scenario.network.iterations,
+        "messages_per_frame": round(sent.get("consensus", 0) / frames, 3),
+        "bytes_per_frame": {
+            "dcpf": round(octets.get("consensus", 0) / frames, 1),
+            "cpf": round(octets.get("pixels", 0) / frames, 1),
+        },
+        "late": sum(int(_plain(status.counters.get("late"))) for status in results.statuses.values()),
+        "refused": int(sum(_total(results, "refused").values())),
+    }
+
+
+def _total(results: Results, group: str) -> dict[str, float]:
+    total: dict[str, float] = {}
+    for status in results.statuses.values():
+        counted = status.counters.get(group)
+        for kind, number in (counted if isinstance(counted, Mapping) else {}).items():
+            total[kind] = total.get(kind, 0) + number
+    return total
+
+
+def _fusion(results: Results) -> dict[str, Any]:
+    """How often Eq. 17's difference of information matrices was no density's; 0 for the other rules."""
+    steps = max(1, len(results.of("dcpf")) * (results.scenario.frames - 1))
+    names = ("indefinite_local", "indefinite_fused")
+    return {
+        f"{name}_fraction": sum(_plain(s.counters.get(name)) for s in results.statuses.values()) / steps
+        for name in names
+    }
+
+
+def _timing(results: Results) -> dict[str, Any]:
+    """Percentiles over the cameras: the median of their medians, the largest of their 99th percentiles."""
+    cameras = {camera.name for camera in results.scenario.cameras}
+    timing: dict[str, Any] = {}
+    for name in ("local_filter_ms", "consensus_round_ms"):
+        found = [
+            s.timing[name] for node, s in results.statuses.items() if node in cameras and name in s.timing
+        ]
+        each = [percentiles for percentiles in found if isinstance(percentiles, Mapping)]
+        if each:
+            timing[name] = {
+                "p50": float(np.median([p["p50"] for p in each])),
+                "p99": max(p["p99"] for p in each),
+            }
+    return timing
+
+
+def _plain(value: float | Mapping[str, float] | None) -> float:
+    return 0 if value is None or isinstance(value, Mapping) else value
