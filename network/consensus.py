@@ -97,7 +97,9 @@ class Consensus:
         """The neighbours whose message of this round may still come, sorted by name."""
         if self.done:
             return ()
-        return tuple(name for name in self._present() if self._heard[name] < self._position)
+        return tuple(
+            name for name in self.neighbors if name not in self._absent and self._heard[name] < self._position
+        )
 
     def drop(self, neighbor: str) -> tuple[ConsensusMessage, ...]:
         """Goes on without a neighbour from now on; what it has said for this round still counts."""

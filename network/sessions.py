@@ -48,17 +48,18 @@ def open_router(listen: Sequence[str]) -> zenoh.Session:
     return _open("router", listen, [], wait_ms=_FOREVER_MS, scouting_delay_ms=0)
 
 
-def open_client(endpoint: str, timeout_s: float = 3.0) -> zenoh.Session:
+def open_client(endpoint: str, timeout_s: float | None = 3.0) -> zenoh.Session:
     """Opens a session from the outside: a client of the run's router.
 
     Args:
         endpoint: Where the router listens.
-        timeout_s: How long to try.
+        timeout_s: How long to try; None waits until there is one, and finds one again that went.
 
     Raises:
         NetworkError: Nobody answers there.
     """
-    return _open("client", [], [endpoint], wait_ms=int(1000 * timeout_s), scouting_delay_ms=0)
+    wait_ms = _FOREVER_MS if timeout_s is None else int(1000 * timeout_s)
+    return _open("client", [], [endpoint], wait_ms=wait_ms, scouting_delay_ms=0)
 
 
 def close(session: zenoh.Session) -> None:

@@ -16,7 +16,6 @@ from network.messages import (
     ConsensusMessage,
     ControlMessage,
     EstimateMessage,
-    Message,
     PeerMessage,
     PixelsMessage,
     StatusMessage,
@@ -56,8 +55,8 @@ class Links:
             **dict.fromkeys(self.cameras, PixelsMessage),
         }
 
-    def receivers(self, message: Message) -> tuple[str, ...]:
-        """The nodes that a message goes to; none for public messages, which nobody inside waits for."""
+    def receivers(self, message: PeerMessage) -> tuple[str, ...]:
+        """The nodes that a message goes to."""
         match message:
             case ConsensusMessage():
                 return self.neighbors
@@ -65,8 +64,6 @@ class Links:
                 return self.sinks
             case ConfirmMessage():
                 return self.cameras
-            case _:
-                return ()
 
 
 def links_of(graph: Graph, sinks: Iterable[str] = ()) -> dict[str, Links]:

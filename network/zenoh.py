@@ -75,6 +75,8 @@ class ZenohTransport:
         self.counters = Traffic()
         self._run, self._name, self._links = run, name, links
         self._heard = links.heard()
+        self._inbox_keys = {sender: _KEYS[kind](run, sender) for sender, kind in self._heard.items()}
+        self._token_key = keys.alive(run, name)
         self._alive: set[str] = set()
         self._alive_changed = threading.Condition()
         self._orders: queue.SimpleQueue[bytes] = queue.SimpleQueue()
@@ -82,7 +84,7 @@ class ZenohTransport:
         self._wait: tuple[str, float] | None = None
         self._closed = threading.Event()
         self._session = sessions.open_peer(listen, connect)
-        self._inboxes = {sender: self._declare_inbox(sender, kind) for sender, kind in self._heard.items()}
+        self._inboxes = {sender: self._declare_inbox(sender) for sender in self._heard}
         self._declare_orders()
         self._publishers = self._declare_publishers(drop_late_pixels=drop_late_pixels)
         self._declare_liveliness()
@@ -90,7 +92,7 @@ class ZenohTransport:
 
     def announce(self) -> None:
         """Tells everybody that this node hears: from here on messages to it arrive."""
-        self._token = self._session.liveliness().declare_token(keys.alive(self._run, self._name))
+        self._token = self._session.liveliness().declare_token(self._token_key)
 
     def alive(self, name: str) -> bool:
         """Whether a node has announced itself and is there."""
@@ -168,9 +170,9 @@ class ZenohTransport:
         self._closed.set()
         sessions.close(self._session)
 
-    def _declare_inbox(self, sender: str, kind: type[PeerMessage]) -> _Inbox:
-        key = _KEYS[kind](self._run, sender)
-        return self._session.declare_subscriber(key, zenoh.handlers.RingChannel(_DEPTHS[kind]))
+    def _declare_inbox(self, sender: str) -> _Inbox:
+        depth = _DEPTHS[self._heard[sender]]
+        return self._session.declare_subscriber(self._inbox_keys[sender], zenoh.handlers.RingChannel(depth))
 
     def _declare_orders(self) -> None:
         """Hears orders to the run, and answers those who ask for the latest status and estimate."""
@@ -237,11 +239,11 @@ class ZenohTransport:
 
     def _wake(self, sender: str) -> None:
         """Puts an empty message into a sender's inbox, for whoever waits there."""
-        if sender not in self._inboxes:
-            return
-        key = _KEYS[self._heard[sender]](self._run, sender)
-        with contextlib.suppress(zenoh.ZError):  # the session is closing: nobody waits any more
-            self._session.put(key, _WAKE_UP, allowed_destination=Locality.SESSION_LOCAL)
+        if sender in self._inbox_keys:
+            with contextlib.suppress(zenoh.ZError):  # the session is closing: nobody waits any more
+                self._session.put(
+                    self._inbox_keys[sender], _WAKE_UP, allowed_destination=Locality.SESSION_LOCAL
+                )
 
 
 def publish(session: zenoh.Session, run: str, message: ControlMessage | TruthMessage) -> None:
