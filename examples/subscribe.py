@@ -1,0 +1,15 @@
+"""Hears every estimate of every run: needs eclipse-zenoh and the standard library only."""
+
+import json
+
+import zenoh
+
+config = zenoh.Config.from_json5(
+    """{mode: "client", scouting: {multicast: {enabled: false}},
+        connect: {endpoints: ["tcp/127.0.0.1:7447"], timeout_ms: -1}}"""
+)
+with zenoh.open(config) as session, session.declare_subscriber("dcpf/*/*/estimate") as subscriber:
+    for sample in subscriber:
+        estimate = json.loads(sample.payload.to_string())
+        x, y = estimate["mean"][:2]
+        print(f"{estimate['frame']:4d}  {estimate['estimator']:6s} {estimate['node']:8s} {x:7.3f} {y:7.3f} m")
