@@ -76,15 +76,17 @@ def squared_distances(
 ) -> Float[np.ndarray, " N"]:
     """The Bhattacharyya distance d² of each box to the reference.
 
-    Parts of which nothing is in the picture do not count; a box with none at all has distance 1.
+    Parts of which nothing is in the picture, or in the reference, do not count; a box with none at all has
+    distance 1.
     """
-    weights = np.array(options.part_weights)
+    weights = np.array(options.part_weights) * reference.any(axis=(1, 2))
     # h = counts / pixels; Σ_b √(h q), mean over channels, weighted mean over parts
     scale = np.sqrt(reference[reference > 0]) * weights[book.part] / book.n_channels
     inverse_root = 1 / np.sqrt(np.maximum(pixels, 1))
     coefficient = np.einsum("nk,k,nk->n", np.sqrt(counts), scale, inverse_root[:, book.part])
     seen = (pixels > 0) @ weights
-    return 1 - np.divide(coefficient, seen, out=np.zeros_like(seen), where=seen > 0)
+    similarity = np.divide(coefficient, seen, out=np.zeros_like(seen), where=seen > 0)
+    return np.maximum(1 - similarity, 0.0)  # a perfect match is below zero by rounding
 
 
 def update_appearance(

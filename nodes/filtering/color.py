@@ -9,7 +9,7 @@ from typing import Literal
 import cv2
 import numpy as np
 from jaxtyping import Float, Int, UInt8
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from network.options import Options
 
@@ -31,6 +31,18 @@ class ColorOptions(Options):
     """How much each part counts in the distance; adds up to 1."""
     gain_correction: bool = False
     """Whether each channel's gain is brought back to that of the camera's first picture."""
+
+    @model_validator(mode="after")
+    def _every_part_has_a_weight(self) -> "ColorOptions":
+        if len(self.parts) != len(self.part_weights):
+            raise ValueError(
+                f"there are {len(self.parts)} parts and {len(self.part_weights)} part_weights:"
+                " give each part its weight"
+            )
+        for name, shares in (("parts", self.parts), ("part_weights", self.part_weights)):
+            if min(shares, default=0.0) < 0 or abs(sum(shares) - 1) > 1e-6:
+                raise ValueError(f"{name} must be at least 0 and add up to 1, got {list(shares)}")
+        return self
 
     @property
     def n_channels(self) -> int:

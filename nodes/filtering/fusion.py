@@ -38,7 +38,7 @@ class FusionOptions(Options):
     proposal: Literal["prior", "optimal"] = "optimal"
     """`prior`: P(x(k) | x(k-1)), as in the paper; `optimal`: given the fused Gaussian as
     well, in closed form."""
-    ridge: float = Field(default=1e-10, ge=0)
+    ridge: float = Field(default=1e-10, gt=0)
     """Added to the diagonals of covariances before they are inverted, in squared units of the state."""
 
 
@@ -79,16 +79,9 @@ def pack(result: LocalResult, options: FusionOptions) -> Float[np.ndarray, " K"]
 def _position_information(result: LocalResult, options: FusionOptions) -> Information:
     if options.rule == "net_information":
         return net_information(result.posterior.position(), result.predicted.position(), options.ridge)
-    flat = np.all(result.log_likelihoods == result.log_likelihoods[0])
-    if flat:
-        n_axes = result.particles.positions.shape[1]
-        return Information(np.zeros((n_axes, n_axes)), np.zeros(n_axes))
     # halfway between prior and posterior, where the fused result will be
-    halfway = reweight(
-        Particles(result.particles.states, np.log(np.maximum(result.prior_weights, 1e-300))),
-        0.5 * result.log_likelihoods,
-    )
-    return fit_log_quadratic(result.particles.positions, result.log_likelihoods, halfway.weights)
+    halfway = reweight(result.prior, 0.5 * result.log_likelihoods)
+    return fit_log_quadratic(halfway.positions, result.log_likelihoods, halfway.weights)
 
 
 def is_density(result: LocalResult, options: FusionOptions) -> bool:
@@ -112,16 +105,14 @@ def unpack(average: Float[np.ndarray, " K"], n_cameras: int, n_states: int, opti
         n_states: D.
         options: The rule that packed it.
     """
-    total = n_cameras * average
-    if options.rule != "eq17":
-        n_axes = n_states // 2
-        split = n_axes * (n_axes + 1) // 2
-        return Fused(Information(unpack_symmetric(total[:split], n_axes), total[split:]), is_density=True)
-    # N(χ; u, p) / N(χ; v, r), with p⁻¹ = N X_c1, p⁻¹u = N x_c2, r⁻¹ = N X_c3, r⁻¹v = N x_c4
-    split = n_states * (n_states + 1) // 2
-    after, before = total[: split + n_states], total[split + n_states :]
-    matrix = unpack_symmetric(after[:split] - before[:split], n_states)
-    return Fused(Information(matrix, after[split:] - before[split:]), _is_semidefinite(matrix))
+    gain, size = n_cameras * average, n_states // 2
+    if options.rule == "eq17":
+        # N(χ; u, p) / N(χ; v, r), with p⁻¹ = N X_c1, p⁻¹u = N x_c2, r⁻¹ = N X_c3, r⁻¹v = N x_c4
+        after, before = np.split(gain, 2)
+        gain, size = after - before, n_states
+    split = size * (size + 1) // 2
+    matrix = unpack_symmetric(gain[:split], size)
+    return Fused(Information(matrix, gain[split:]), _is_semidefinite(matrix))
 
 
 def reweight_by_ratio(predicted: Particles, fused: Fused) -> Particles:
@@ -136,27 +127,27 @@ def draw_optimal(
 ) -> Particles:
     """Draws from P(x(k) | x(k-1), fused factor), and weights by its normaliser.
 
-    With a Gaussian factor exp(-½ xᵀΛx + xᵀη) on the position, the optimal proposal is closed (Doucet et al.
-    2000): covariance Σ = (Q⁻¹ + Λ)⁻¹, mean Σ(Q⁻¹Fx + η).
+    With a Gaussian factor exp(-½ xᵀΛx + xᵀη) on the state or its position, the optimal proposal is closed
+    (Doucet et al. 2000): covariance Σ = (Q⁻¹ + Λ)⁻¹, mean Σ(Q⁻¹Fx + η). It is taken in axes in which Q is the
+    identity and Λ diagonal, so that nothing is inverted and no large numbers cancel.
     """
-    n_axes = motion.n_axes
     moved = transition(previous.states, motion)
-    # around the cloud's middle, so that the products below stay small
-    center = previous.weights @ moved[:, :n_axes]
-    y = moved[:, :n_axes] - center
-    eta = fused.gain.vector - fused.gain.matrix @ center
-    precision = 1 / motion.variances[:n_axes]
-    # Σ = (Q⁻¹ + Λ)⁻¹, b = Q⁻¹Fx + η
-    covariance = np.linalg.inv(np.diag(precision) + fused.gain.matrix)
-    covariance = (covariance + covariance.T) / 2
-    b = precision * y + eta
-    # ω(k) = ω(k-1) exp(½ bᵀΣb - ½ (Fx)ᵀQ⁻¹Fx)
-    normalizer = 0.5 * np.einsum("ni,ij,nj->n", b, covariance, b) - 0.5 * (y * y) @ precision
-    # x(k) ~ N(Σb, Σ); the velocity's noise is independent of the position's
     noise = rng.standard_normal(moved.shape)
-    positions = center + b @ covariance + noise[:, :n_axes] @ np.linalg.cholesky(covariance).T
-    velocities = moved[:, n_axes:] + np.sqrt(motion.variances[n_axes:]) * noise[:, n_axes:]
-    return reweight(Particles(np.hstack([positions, velocities]), previous.log_weights), normalizer)
+    # Q = S², S Λ S = V diag(λ) Vᵀ
+    n = len(fused.gain.vector)
+    S = np.sqrt(motion.variances)
+    curvature, V = np.linalg.eigh(S[:n, None] * fused.gain.matrix * S[:n])
+    curvature = np.maximum(curvature, 0.0)  # below zero by rounding only: the factor is a density
+    # y = Vᵀ S⁻¹ Fx and e = Vᵀ S η, around the cloud's middle
+    center = previous.weights @ moved[:, :n]
+    y = (moved[:, :n] - center) / S[:n] @ V
+    e = (fused.gain.vector - fused.gain.matrix @ center) * S[:n] @ V
+    # ω(k) = ω(k-1) Π exp((e y - ½ λ y²) / (1 + λ))
+    normalizer = ((e - 0.5 * curvature * y) * y / (1 + curvature)).sum(axis=1)
+    # x(k) ~ N((y + e) / (1 + λ), 1 / (1 + λ)); what the factor says nothing about follows the prior
+    drawn = (y + e) / (1 + curvature) + noise[:, :n] / np.sqrt(1 + curvature)
+    states = np.hstack([center + drawn @ V.T * S[:n], moved[:, n:] + S[n:] * noise[:, n:]])
+    return reweight(Particles(states, previous.log_weights), normalizer)
 
 
 def fuse(
@@ -171,12 +162,15 @@ def fuse(
 
     Args:
         previous: The particles of the frame before.
-        predicted: The same, propagated (used by the prior proposal).
+        predicted: The same, propagated: drawn from the prior.
         fused: From `unpack`.
         motion: The state model.
         options: The proposal.
         rng: The fusion filter's stream.
     """
+    # Where nobody saw anything, the prediction stands.
+    if not (fused.gain.matrix.any() or fused.gain.vector.any()):
+        return predicted
     if options.proposal == "optimal" and fused.is_density:
         return draw_optimal(previous, fused, motion, rng)
     return reweight_by_ratio(predicted, fused)

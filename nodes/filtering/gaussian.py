@@ -41,18 +41,26 @@ def moments(states: Float[np.ndarray, "N D"], weights: Float[np.ndarray, " N"]) 
     return Moments(mean, (covariance + covariance.T) / 2)
 
 
+def regularized(covariance: Float[np.ndarray, "D D"], ridge: float) -> Float[np.ndarray, "D D"]:
+    """A covariance that can be inverted, also that of a sample collapsed to a line or a point.
+
+    Args:
+        covariance: Of a sample; positive semidefinite up to rounding.
+        ridge: Added to the diagonal, above 0; a little of the trace is as well, for a ridge below rounding.
+    """
+    return covariance + (ridge + 1e-12 * np.trace(covariance)) * np.eye(len(covariance))
+
+
+def no_information(n: int) -> Information:
+    """The factor 1, which says nothing about n numbers."""
+    return Information(np.zeros((n, n)), np.zeros(n))
+
+
 def to_information(gaussian: Moments, ridge: float) -> Information:
     """From p and u to p⁻¹ and p⁻¹u, which Eq. 3 averages; `ridge` is added to the diagonal of p."""
-    covariance = gaussian.covariance + ridge * np.eye(len(gaussian.mean))
-    matrix = np.linalg.inv(covariance)
+    matrix = np.linalg.inv(regularized(gaussian.covariance, ridge))
     matrix = (matrix + matrix.T) / 2
     return Information(matrix, matrix @ gaussian.mean)
-
-
-def to_moments(information: Information) -> Moments:
-    """From p⁻¹ and p⁻¹u to p and u and p⁻¹u (Eq. 15-16)."""
-    covariance = np.linalg.inv(information.matrix)
-    return Moments(covariance @ information.vector, (covariance + covariance.T) / 2)
 
 
 def log_factor(
@@ -76,12 +84,11 @@ def net_information(posterior: Moments, predicted: Moments, ridge: float) -> Inf
         predicted: v and r of Eq. 9-10.
         ridge: Added to both covariances' diagonals, m².
     """
-    eye = np.eye(len(predicted.mean))
     if np.array_equal(posterior.covariance, predicted.covariance):
-        return Information(0.0 * eye, 0.0 * predicted.mean)
+        return no_information(len(predicted.mean))
     # r = L Lᵀ, M = Lᵀ p⁻¹ L = V diag(m) Vᵀ
-    L = np.linalg.cholesky(predicted.covariance + ridge * eye)
-    M = L.T @ np.linalg.solve(posterior.covariance + ridge * eye, L)
+    L = np.linalg.cholesky(regularized(predicted.covariance, ridge))
+    M = L.T @ np.linalg.solve(regularized(posterior.covariance, ridge), L)
     m, V = np.linalg.eigh((M + M.T) / 2)
     # the directions with m > 1
     gain = np.where(m > 1, m - 1, 0.0)
@@ -100,7 +107,8 @@ def fit_log_quadratic(
     """The concave quadratic nearest to a log-likelihood, by weighted least squares over the particles.
 
     An alternative to the net information that looks at the likelihood itself, not at two samples' moments:
-    its error is that of a regression instead of that of two covariances.
+    its error is that of a regression instead of that of two covariances. A flat log-likelihood, and a sample
+    of too few points to tell a quadratic, give zero, exactly.
 
     Args:
         positions: The particles' positions.
@@ -108,6 +116,8 @@ def fit_log_quadratic(
         weights: Where the fit has to be good; adds up to one.
     """
     n_axes = positions.shape[1]
+    if np.all(log_likelihoods == log_likelihoods[0]):
+        return no_information(n_axes)
     center = weights @ positions
     scale = np.sqrt(weights @ (positions - center) ** 2) + 1e-9
     y = (positions - center) / scale
@@ -115,7 +125,9 @@ def fit_log_quadratic(
     i, j = np.triu_indices(n_axes)
     columns = np.column_stack([np.ones(len(y)), y, -np.where(i == j, 0.5, 1.0) * y[:, i] * y[:, j]])
     root = np.sqrt(weights)[:, None]
-    coefficients = np.linalg.lstsq(columns * root, log_likelihoods * root[:, 0], rcond=None)[0]
+    coefficients, _, rank, _ = np.linalg.lstsq(columns * root, log_likelihoods * root[:, 0], rcond=None)
+    if rank < columns.shape[1]:
+        return no_information(n_axes)
     matrix = np.zeros((n_axes, n_axes))
     matrix[i, j] = matrix[j, i] = coefficients[1 + n_axes :]
     # the concave part: directions in which the likelihood falls off

@@ -11,8 +11,8 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int
-from pydantic import Field
+from jaxtyping import Bool, Float, Int
+from pydantic import Field, PositiveInt
 
 from network.options import Options
 
@@ -20,7 +20,7 @@ from network.options import Options
 class SamplingOptions(Options):
     """Which pixels of a box are counted."""
 
-    grid: tuple[int, int] | None = (15, 15)
+    grid: tuple[PositiveInt, PositiveInt] | None = (15, 15)
     """Columns and rows of the grid of samples; null counts every pixel of the box."""
     kernel: Literal["uniform", "epanechnikov"] = "uniform"
     """`epanechnikov` samples the middle of the box more densely than its border; needs a grid."""
@@ -50,13 +50,11 @@ class Codebook:
         return np.concatenate([[0.0], np.cumsum(self.part_heights)])
 
 
-def codebook(
-    used: "np.ndarray[tuple[int, ...], np.dtype[np.bool_]]", part_heights: tuple[float, ...]
-) -> Codebook:
+def codebook(used: Bool[np.ndarray, "P C B"], part_heights: tuple[float, ...]) -> Codebook:
     """Gives a code to each bin that is used.
 
     Args:
-        used: (P, C, B) whether a bin is told apart from the rest.
+        used: Whether a bin is told apart from the rest.
         part_heights: Heights of the P parts.
     """
     n_channels = used.shape[1]
@@ -124,9 +122,10 @@ def _count_every_pixel(
     bins: Int[np.ndarray, "C h w"], boxes: Float[np.ndarray, "N 4"], book: Codebook
 ) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, "N P"]]:
     height, width = bins.shape[1:]
-    left, right = np.clip(np.rint(boxes[:, [0, 2]]), 0, width).astype(np.intp).T
+    # A pixel belongs to a box that holds its centre.
+    left, right = np.clip(np.floor(boxes[:, [0, 2]] + 0.5), 0, width).astype(np.intp).T
     tops = boxes[:, 1:2] + book.part_edges * (boxes[:, 3:4] - boxes[:, 1:2])
-    edges = np.clip(np.rint(tops), 0, height).astype(np.intp)
+    edges = np.clip(np.floor(tops + 0.5), 0, height).astype(np.intp)
     counts = np.empty((len(boxes), len(book.part)), dtype=np.intp)
     for code, (part, channel, bin_) in enumerate(np.argwhere(book.codes < len(book.part))):
         integral = cv2.integral((bins[channel] == bin_).view(np.uint8))

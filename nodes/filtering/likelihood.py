@@ -13,6 +13,9 @@ from pydantic import Field
 
 from network.options import Options
 
+INDISTINCT = 1e-3
+"""d² below which two histograms of a few hundred samples are the same."""
+
 
 class LikelihoodOptions(Options):
     """How much a distance between histograms weighs."""
@@ -63,9 +66,10 @@ def background_constants(
     """d₀² and σ² from the distances of boxes around the target, which show what it is not.
 
     Constants tuned on one scene fail on the next; these follow the scene. Where fewer than four boxes can
-    be seen, the fixed constants serve.
+    be seen, or they look like the target, the fixed constants serve.
     """
-    if options.calibration == "fixed" or len(surroundings) < 4:
+    fixed = options.calibration == "fixed" or len(surroundings) < 4
+    if fixed or np.median(surroundings) < INDISTINCT:
         return options.miss_distance, options.sigma**2
     # d₀² = 0.4 median d², σ² = d₀² / 10
     miss_distance = options.background_fraction * float(np.median(surroundings))

@@ -4,15 +4,12 @@ Source: Jing & Chen, section 3.1, Eq. 9-14.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.particles import Particles, reweight
-
-LocalParticles = Literal["own", "shared"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,16 +19,16 @@ class LocalResult:
     Attributes:
         predicted: v and r, before the measurement.
         posterior: u and p, after it.
-        particles: The reweighted particles.
+        prior: The particles before it.
+        particles: The same, reweighted.
         log_likelihoods: ℓ of each particle.
-        prior_weights: The weights before the measurement.
     """
 
     predicted: Moments
     posterior: Moments
+    prior: Particles
     particles: Particles
     log_likelihoods: Float[np.ndarray, " N"]
-    prior_weights: Float[np.ndarray, " N"]
 
 
 def local_filter(predicted: Particles, log_likelihoods: Float[np.ndarray, " N"]) -> LocalResult:
@@ -41,11 +38,10 @@ def local_filter(predicted: Particles, log_likelihoods: Float[np.ndarray, " N"])
         predicted: Propagated particles with their old weights, the filter's own or the fusion filter's.
         log_likelihoods: ℓ of each.
     """
-    prior_weights = predicted.weights
     # v, r: propagated particles with the weights not updated yet (Eq. 9-10)
-    before = moments(predicted.states, prior_weights)
+    before = moments(predicted.states, predicted.weights)
     # ω(k) ∝ ω(k-1) P(z | χ(k)) (Eq. 12)
     posterior = reweight(predicted, log_likelihoods)
     # u, p: with the updated weights (Eq. 13-14)
     after = moments(posterior.states, posterior.weights)
-    return LocalResult(before, after, posterior, log_likelihoods, prior_weights)
+    return LocalResult(before, after, predicted, posterior, log_likelihoods)

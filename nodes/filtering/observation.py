@@ -156,7 +156,8 @@ class ObservationModel:
     ) -> Appearance:
         """Its own reference in place of the neighbours', at the first good sight of the target."""
         sight = self.sight(picture, position, appearance)
-        if sight.visible < GOOD_SIGHT or sight.squared_distance > 0.7 * appearance.miss_distance:
+        max_distance = self.options.model_update.max_distance * appearance.miss_distance
+        if sight.visible < GOOD_SIGHT or sight.squared_distance > max_distance:
             return appearance
         return self.first_appearance(picture, position) or appearance
 

@@ -88,10 +88,9 @@ def systematic_indices(weights: Float[np.ndarray, " N"], offset: float) -> Int[n
         The ancestor of each new particle; particle i has floor or ceil of N·ωᵢ children.
     """
     n = len(weights)
-    cumulative = np.cumsum(weights)
-    # The rounding error of the sum goes to the last particle that has any weight.
-    cumulative[np.flatnonzero(weights)[-1] :] = 1.0
-    return np.searchsorted(cumulative, (np.arange(n) + offset) / n, side="right")
+    # The last particle that has any weight takes all above, and with it the rounding error of the sum.
+    last = np.flatnonzero(weights)[-1]
+    return np.searchsorted(np.cumsum(weights[:last]), (np.arange(n) + offset) / n, side="right")
 
 
 def resample_if_degenerate(particles: Particles, ess_threshold: float, rng: np.random.Generator) -> Particles:

@@ -9,6 +9,9 @@ from pydantic import Field
 from network.options import Options
 from nodes.camera import Camera
 
+MIN_ASPECT = 0.8
+"""Least height of a box in widths: what is left of a person seen from straight above."""
+
 
 class StartOptions(Options):
     """What every filter is told about the target at frame 0."""
@@ -82,10 +85,6 @@ def project_boxes(
     boxes = np.concatenate([low, high], axis=1)
     boxes[~(half_height > 1.0)] = np.nan
     return boxes
-
-
-MIN_ASPECT = 0.8
-"""Least height of a box in widths: what is left of a person seen from straight above."""
 
 
 def visible_fraction(boxes: Float[np.ndarray, "N 4"], camera: Camera) -> Float[np.ndarray, " N"]:

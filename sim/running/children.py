@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Self
 
@@ -17,7 +17,7 @@ from network.sessions import RUNTIME_ENVIRONMENT
 
 LEAVE_S = 3.0
 """How long a process has to leave by itself before it is ended."""
-ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 class RunFailed(Exception):  # noqa: N818 - what it says is that the run failed
@@ -66,8 +66,8 @@ class Children:
             self._router = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, start_new_session=True
             )
-        assert self._router.stdout is not None
-        if not self._router.stdout.readline():
+        said = self._router.stdout
+        if said is None or not said.readline():
             raise NetworkError(self.last_words("router"))
 
     def start(self, name: str, command: Sequence[str]) -> None:
@@ -105,7 +105,7 @@ def _hang_up(process: subprocess.Popen[bytes]) -> None:
         process.stdin.close()
 
 
-def _end(processes: "Iterator[subprocess.Popen[bytes]] | Sequence[subprocess.Popen[bytes]]") -> None:
+def _end(processes: Iterable[subprocess.Popen[bytes]]) -> None:
     limit = time.monotonic() + LEAVE_S
     waiting = list(processes)
     for end in (subprocess.Popen.terminate, subprocess.Popen.kill):

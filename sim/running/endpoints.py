@@ -1,4 +1,4 @@
-"""Where the processes of a run find each other: sockets in a folder of their own, or ports for nodes by hand."""
+"""Where the processes of a run find each other: sockets in a folder, or ports for nodes by hand."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -66,9 +66,12 @@ def _converse(network: MemoryNetwork, nodes: Nodes) -> Iterator[EstimateMessage]
         receiver, message = delivered
         node = nodes[receiver]
         if isinstance(node, SmartCamera) and isinstance(message, ConsensusMessage):
-            yield from _speak(network, receiver, node.on_message(message))
+            replies: Iterable[Message] = node.on_message(message)
         elif isinstance(node, Central) and isinstance(message, PixelsMessage):
-            yield from _speak(network, receiver, node.on_message(message))
+            replies = node.on_message(message)
+        else:
+            continue
+        yield from _speak(network, receiver, replies)
 
 
 def _speak(network: MemoryNetwork, sender: str, messages: Iterable[Message]) -> Iterator[EstimateMessage]:

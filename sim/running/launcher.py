@@ -1,8 +1,7 @@
-"""Launches a run: one process a node and one for the router; listens to them as anybody could; ends them all."""
+"""Launches a run: one process a node, one for the router; listens as anybody could; ends them all."""
 
 import logging
 import queue
-import subprocess
 import sys
 import tempfile
 import time
@@ -13,12 +12,12 @@ from pathlib import Path
 import zenoh
 
 from network import codec, keys, sessions
-from network.errors import NetworkError, RefusedMessage
+from network.errors import RefusedMessage
 from network.messages import ControlMessage, EstimateMessage, StatusMessage, TruthMessage
 from network.zenoh import publish
 from sim.assembly import Assembly
 from sim.running.children import Children, RunFailed
-from sim.running.endpoints import Endpoints, in_folder
+from sim.running.endpoints import Endpoints, by_hand, in_folder
 from sim.running.recorder import Recorder, expected_tracks
 from sim.running.results import Results
 
@@ -36,7 +35,9 @@ Progress = Callable[[int], None]
 class Launch:
     """A run in processes, from the first to the last. Everything that the launcher does is in here."""
 
-    def __init__(self, assembly: Assembly, recorder: Recorder, progress: Progress, by_hand: Sequence[str]) -> None:
+    def __init__(
+        self, assembly: Assembly, recorder: Recorder, progress: Progress, by_hand: Sequence[str]
+    ) -> None:
         """A run that has not begun.
 
         Args:
@@ -89,11 +90,20 @@ class Launch:
         scenario, graph = self._assembly.scenario, self._assembly.graph
         folder = Path(tempfile.mkdtemp(prefix="dcpf-"))
         endpoints = in_folder(folder, scenario)
+        if self._by_hand:
+            # Who is started by hand, perhaps on another host, cannot be told of our folder.
+            endpoints = Endpoints(endpoints.router, by_hand(scenario).nodes)
         sink = scenario.central.name if scenario.baselines.cpf else None
         with Children(self._recorder.folder / "logs") as children:
             children.start_router([endpoints.router, scenario.network.router], folder)
             for name in sorted(self._nodes - set(self._by_hand)):
-                command = [sys.executable, "-m", "sim.running.node", str(self._recorder.folder / "scenario.yaml"), name]
+                command = [
+                    sys.executable,
+                    "-m",
+                    "sim.running.node",
+                    str(self._recorder.folder / "scenario.yaml"),
+                    name,
+                ]
                 command += ["--listen", endpoints.nodes[name]]
                 for endpoint in endpoints.connects(name, graph, sink):
                     command += ["--connect", endpoint]
@@ -116,7 +126,9 @@ class Launch:
             if isinstance(message, StatusMessage) and message.state == "ready":
                 ready.add(message.node)
             for name, code in children.ended():
-                raise RunFailed(f"node {name} ended with code {code} before the start: {children.last_words(name)}")
+                raise RunFailed(
+                    f"node {name} ended with code {code} before the start: {children.last_words(name)}"
+                )
             if limit is not None and time.monotonic() > limit:
                 missing = ", ".join(sorted(self._nodes - ready))
                 raise RunFailed(f"{missing} did not get ready within {START_LIMIT_S:.0f} s: see the logs")
@@ -157,8 +169,9 @@ class Launch:
             self._recorder.event("seen" if seen else "lost", keys.node_of(key), frame=self._frames_done)
             return None
         try:
-            kind = EstimateMessage if key.endswith("/estimate") else StatusMessage
-            return codec.decode_public(kind, data)
+            if key.endswith("/estimate"):
+                return codec.decode_public(EstimateMessage, data)
+            return codec.decode_public(StatusMessage, data)
         except RefusedMessage as refusal:
             self._recorder.event("refused", keys.node_of(key), reason=refusal.reason)
             return None

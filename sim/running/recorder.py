@@ -1,7 +1,6 @@
 """The folder of a run: written as the run goes, readable at any moment, the summary whole or not at all."""
 
 import json
-import os
 from collections.abc import Iterable
 from contextlib import suppress
 from datetime import UTC, datetime
@@ -107,7 +106,7 @@ class Recorder:
         part = self.folder / "summary.json.part"
         try:
             part.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-            os.replace(part, self.folder / "summary.json")
+            part.replace(self.folder / "summary.json")
         except OSError as error:
             raise _cannot_write(self.folder, error) from error
 
@@ -150,11 +149,13 @@ def read_run(folder: Path) -> Results:
     if not (folder / "scenario.yaml").is_file():
         raise RecordingError(f"{folder}: is not the folder of a run: name one that `dcpf run` has written")
     results = Results(load_scenario(folder / "scenario.yaml"))
-    for name, kind in (("estimates", EstimateMessage), ("truth", TruthMessage)):
-        for line in _lines(folder / f"{name}.jsonl"):
-            # The last line of a run that was cut off may be half a message.
-            with suppress(RefusedMessage):
-                results.add(decode_public(kind, line))
+    # The last line of a run that was cut off may be half a message.
+    for line in _lines(folder / "estimates.jsonl"):
+        with suppress(RefusedMessage):
+            results.add(decode_public(EstimateMessage, line))
+    for line in _lines(folder / "truth.jsonl"):
+        with suppress(RefusedMessage):
+            results.add(decode_public(TruthMessage, line))
     return results
 
 
@@ -164,4 +165,6 @@ def _lines(path: Path) -> list[bytes]:
 
 def _cannot_write(folder: Path, error: Exception) -> RecordingError:
     cause = error.strerror if isinstance(error, OSError) else str(error)
-    return RecordingError(f"{folder}: the run cannot be recorded there: {cause}: free space, or name another --out")
+    return RecordingError(
+        f"{folder}: the run cannot be recorded there: {cause}: free space, or name another --out"
+    )

@@ -33,6 +33,11 @@ class Results:
     statuses: dict[str, StatusMessage] = field(default_factory=dict)
     timing: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def frames_done(self) -> int:
+        """Frames of which something is known."""
+        return 1 + max((max(found) for found in self.tracks.values()), default=-1)
+
     def add(self, message: EstimateMessage | TruthMessage | StatusMessage) -> None:
         """Takes what a node, or the world, has told."""
         match message:

@@ -1,0 +1,111 @@
+"""`dcpf compare`: many runs in process, paired by seed: a table, a plot, and the figures."""
+
+import json
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any
+
+import joblib
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from sim.commands.shared import AsJson, Frames, Overrides, progress_bar, read_scenario, split_overrides
+from sim.running.experiment import compare as compare_runs
+from sim.running.experiment import run_many
+from sim.running.recorder import RecordingError
+
+
+def compare(
+    scenarios: Annotated[list[Path], typer.Argument(metavar="SCENARIO...", help="Scenario files.")],
+    runs: Annotated[int, typer.Option(help="Seeds of each scenario, from the scenario's on.", min=1)] = 10,
+    frames: Frames = None,
+    overrides: Overrides = None,
+    jobs: Annotated[int | None, typer.Option(help="Processes; all cores by default.", min=1)] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results.", show_default=False)] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run scenarios with several seeds and compare DCPF, CPF and the single cameras."""
+    folder = out or Path("runs") / f"compare-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
+    given = [*split_overrides(overrides), *([("frames", str(frames))] if frames else [])]
+    first = [read_scenario(path, overrides, frames=frames) for path in scenarios]
+    _make(folder)
+    report: dict[str, Any] = {}
+    with progress_bar("runs", len(scenarios) * runs) as bar:
+        for path, scenario in zip(scenarios, first, strict=True):
+            seeds = range(scenario.seed, scenario.seed + runs)
+            summaries = []
+            for summary in run_many([path], given, seeds, jobs or joblib.cpu_count()):
+                summaries.append(summary)
+                bar(len(summaries) + runs * len(report))
+            label = f"{scenario.name} ({scenario.preset})"
+            report[label] = {**compare_runs(summaries), "summaries": summaries}
+    try:
+        (folder / "comparison.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+        _plot(report, folder)
+    except OSError as error:
+        raise RecordingError(
+            f"{folder}: cannot be written: {error.strerror}: free space, or name another --out"
+        ) from error
+    if as_json:
+        sys.stdout.write(json.dumps(report) + "\n")
+    else:
+        _print(report, folder)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"{folder}: cannot be made: {error.strerror}: name another --out") from error
+
+
+def _plot(report: dict[str, Any], folder: Path) -> None:
+    # Matplotlib takes its time to import, and only this needs it.
+    from sim.pictures.plots import plot_comparison
+
+    figure = plot_comparison({label: each["summaries"] for label, each in report.items()})
+    for suffix in ("svg", "png"):
+        figure.savefig(folder / f"comparison.{suffix}")
+
+
+def _print(report: dict[str, Any], folder: Path) -> None:
+    console = Console(highlight=False)
+    table = Table(title="medians over the runs (worst in parentheses)", title_justify="left")
+    for heading in (
+        "scenario",
+        "runs",
+        "DCPF",
+        "CPF",
+        "best single",
+        "DCPF/CPF",
+        "lost",
+        "ANEES",
+        "disagree",
+    ):
+        table.add_column(heading, justify="left" if heading == "scenario" else "right")
+    for label, each in report.items():
+        rmse = each["rmse_m"]
+        lost = each["lost_fraction"]["dcpf"]
+        table.add_row(
+            label,
+            str(each["runs"]),
+            *(_spread(rmse[name], " m", 3) for name in ("dcpf", "cpf", "best_single")),
+            _spread(each["ratio_dcpf_cpf"], "", 2),
+            f"{lost:.0%}",
+            _spread(each["anees"]["dcpf"], "", 2),
+            _spread(each["disagreement_m"], " m", 3),
+        )
+    console.print(table)
+    for label, each in report.items():
+        indefinite = each["indefinite_local_fraction"]
+        if indefinite and indefinite["max"]:
+            console.print(
+                f"{label}: Eq. 17's ratio was no density in {indefinite['median']:.0%} of the local results"
+            )
+    console.print(f"figures and plots in {folder}", soft_wrap=True)
+
+
+def _spread(values: dict[str, float] | None, unit: str, digits: int) -> str:
+    return "–" if values is None else f"{values['median']:.{digits}f}{unit} ({values['max']:.{digits}f})"

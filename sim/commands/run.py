@@ -1,0 +1,115 @@
+"""`dcpf run`: launches a scenario, waits, compares, writes the folder of the run."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from sim.assembly import Assembly
+from sim.commands.shared import (
+    AsJson,
+    Frames,
+    Overrides,
+    ScenarioPath,
+    Seed,
+    meters,
+    progress_bar,
+    read_scenario,
+    yes_no,
+)
+from sim.running.in_process import run_in_process
+from sim.running.recorder import Recorder, default_folder
+from sim.running.results import Results, summarize
+from sim.scenario.model import Scenario
+
+
+def run(
+    scenario: ScenarioPath,
+    seed: Seed = None,
+    frames: Frames = None,
+    overrides: Overrides = None,
+    pace: Annotated[
+        Literal["lockstep", "realtime"] | None, typer.Option(help="Pace in place of the scenario's.")
+    ] = None,
+    in_process: Annotated[
+        bool, typer.Option("--in-process", help="One process and one thread, same numbers.")
+    ] = False,
+    name: Annotated[str | None, typer.Option(help="Name of the run, in place of the scenario's.")] = None,
+    by_hand: Annotated[
+        list[str] | None,
+        typer.Option("--by-hand", metavar="NODE", help="A node that you start yourself, with dcpf node."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the run.", show_default=False)] = None,
+    fail_if_lost: Annotated[
+        bool, typer.Option("--fail-if-lost", help="Exit with 1 if DCPF lost the target.")
+    ] = False,
+    as_json: AsJson = False,
+) -> int:
+    """Launch a scenario: one process a camera, the central node and a router; then compare DCPF with CPF."""
+    chosen = read_scenario(scenario, overrides, seed=seed, frames=frames, pace=pace, name=name)
+    folder = out or default_folder(chosen)
+    assembly = Assembly(chosen)
+    with Recorder(folder, chosen) as recorder, progress_bar(f"{chosen.name}: frames", chosen.frames) as bar:
+        dead: list[str] = []
+        if in_process:
+            results = Results(chosen)
+            for message in run_in_process(assembly):
+                results.add(message)
+                recorder.add(message)
+                bar(results.frames_done)
+        else:
+            # Zenoh is imported by those who need it: it takes its time.
+            from sim.running.launcher import Launch
+
+            launch = Launch(assembly, recorder, bar, by_hand or [])
+            results, dead = launch.run(), launch.dead
+        summary = summarize(results, processes=1 if in_process else chosen.n_processes)
+        summary["died"] = dead
+        recorder.finish(summary)
+    if as_json:
+        sys.stdout.write(json.dumps(summary) + "\n")
+    else:
+        _print(summary, chosen, folder)
+    lost = bool(summary["lost"]["dcpf"])
+    return 1 if dead or (fail_if_lost and lost) else 0
+
+
+def _print(summary: dict[str, Any], scenario: Scenario, folder: Path) -> None:
+    console = Console(highlight=False)
+    table = Table(
+        title=f"{summary['scenario']}, {summary['preset']} preset, seed {summary['seed']},"
+        f" {summary['frames']} frames, {summary['processes']} processes",
+        title_justify="left",
+    )
+    for heading in ("estimator", "RMSE", "lost", "ANEES"):
+        table.add_column(heading, justify="left" if heading == "estimator" else "right")
+    rmse, lost, anees = summary["rmse_m"], summary["lost"], summary["anees"]
+    table.add_row("DCPF (all nodes)", meters(rmse["dcpf"]), yes_no(lost["dcpf"]), _plain(anees["dcpf"]))
+    if scenario.baselines.cpf:
+        table.add_row("CPF", meters(rmse["cpf"]), yes_no(lost["cpf"]), _plain(anees["cpf"]))
+    for node, value in rmse["single"].items():
+        table.add_row(f"{node} alone", meters(value), yes_no(lost["single"][node]), "")
+    console.print(table)
+    if summary["ratio_dcpf_cpf"] is not None:
+        console.print(f"DCPF / CPF: {summary['ratio_dcpf_cpf']:.2f}")
+    sent = summary["network"]["bytes_per_frame"]
+    console.print(f"nodes disagree by {meters(summary['disagreement_m'])} in the mean")
+    console.print(f"bytes a frame: DCPF {sent['dcpf']:,.0f}, CPF {sent['cpf']:,.0f}")
+    indefinite = summary["fusion"]["indefinite_local_fraction"]
+    if indefinite:
+        console.print(f"Eq. 17's ratio was no density in {indefinite:.0%} of the local results")
+    timing = summary["timing"]
+    if "frames_per_s" in timing:
+        first, rate = timing["first_estimate_s"], timing["frames_per_s"]
+        console.print(f"first estimate after {first:.1f} s, then {rate:.0f} frames/s")
+    if summary["died"]:
+        console.print(f"died on the way: {', '.join(summary['died'])}")
+    console.print(f"recorded in {folder}", soft_wrap=True)
+
+
+def _plain(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}"

@@ -1,0 +1,79 @@
+"""What commands have in common: options that several take, scenarios with their overrides, tables."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from sim.scenario.loading import load_scenario
+from sim.scenario.model import Scenario
+from sim.scenario.parsing import ScenarioError
+
+ScenarioPath = Annotated[
+    Path, typer.Argument(metavar="SCENARIO", help="The scenario file.", show_default=False)
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Set any key of the scenario, such as filter.n_particles=300."
+    ),
+]
+Seed = Annotated[int | None, typer.Option(help="Seed in place of the scenario's.", min=0, show_default=False)]
+Frames = Annotated[
+    int | None, typer.Option(help="Frames in place of the scenario's.", min=2, show_default=False)
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+
+
+def read_scenario(
+    path: Path,
+    overrides: list[str] | None,
+    *,
+    seed: int | None = None,
+    frames: int | None = None,
+    pace: str | None = None,
+    name: str | None = None,
+) -> Scenario:
+    """A scenario with what the command line says instead.
+
+    Raises:
+        ScenarioError: The file or an override is not as it must be.
+    """
+    given = {"seed": seed, "frames": frames, "pace": pace, "name": name}
+    chosen = [(key, str(value)) for key, value in given.items() if value is not None]
+    return load_scenario(path, [*split_overrides(overrides), *chosen])
+
+
+def split_overrides(overrides: list[str] | None) -> list[tuple[str, str]]:
+    """Keys and values of `--set` options.
+
+    Raises:
+        ScenarioError: One has no `=`.
+    """
+    for each in overrides or []:
+        if "=" not in each:
+            raise ScenarioError(f"--set {each}: has no =: write it like filter.n_particles=300")
+    return [(key, value) for key, _, value in (each.partition("=") for each in overrides or [])]
+
+
+@contextmanager
+def progress_bar(what: str, total: int) -> Iterator[Callable[[int], None]]:
+    """A bar on stderr for long work, with the time left; it is told how much is done."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda done: progress.update(task, completed=done)
+
+
+def meters(value: float | None) -> str:
+    """A length for a table."""
+    return "–" if value is None else f"{value:.3f} m"
+
+
+def yes_no(value: bool | None) -> str:
+    """A fact for a table."""
+    return "–" if value is None else "yes" if value else "no"
