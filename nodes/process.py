@@ -78,6 +78,14 @@ class Shell:
                 return self._obey(order)
         return False
 
+    def wait_for_stop(self) -> None:
+        """Stays until everybody is done: a goodbye could overtake the last messages to the others."""
+        limit = time.monotonic() + self.pace.deadline_s
+        while not self.stopped and time.monotonic() < limit:
+            order = self.transport.wait_for_control(PATIENCE_S)
+            if order is not None and order.action == "stop":
+                return
+
     def _obey(self, order: ControlMessage) -> bool:
         if order.action == "stop":
             self._stopped.set()
@@ -158,6 +166,7 @@ def run_camera(
         if index == 0:
             shell.report("running", index, dict(node.counters))
     shell.report("done" if done == shell.frames - 1 else "failed", done, dict(node.counters))
+    shell.wait_for_stop()
 
 
 def _rounds(node: SmartCamera, deadline: float, shell: Shell) -> None:
@@ -216,6 +225,7 @@ def run_central(node: Central, shell: Shell) -> None:
                 shell.telemetry.late += 1
                 _send(node.on_deadline(), shell)
     shell.report("done" if node.frame == shell.frames else "failed", node.frame - 1, {})
+    shell.wait_for_stop()
 
 
 def _send(messages: Iterable[ConsensusMessage | EstimateMessage | ConfirmMessage], shell: Shell) -> None:

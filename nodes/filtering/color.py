@@ -8,7 +8,7 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Integer, UInt8
 from pydantic import Field, model_validator
 
 from network.options import Options
@@ -82,7 +82,7 @@ def _sparse(image: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "h w 3"]:
 
 def quantize(
     image: UInt8[np.ndarray, "H W 3"], options: ColorOptions, gain: Float[np.ndarray, " 3"]
-) -> Int[np.ndarray, "C H W"]:
+) -> Integer[np.ndarray, "C H W"]:
     """The bin of every pixel in each of the C histograms of a part.
 
     Args:

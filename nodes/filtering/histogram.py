@@ -11,7 +11,7 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, Integer
 from pydantic import Field, PositiveInt
 
 from network.options import Options
@@ -39,7 +39,7 @@ class Codebook:
         part_heights: Heights of the parts as fractions of the box, from the top.
     """
 
-    codes: Int[np.ndarray, "P C B"]
+    codes: Integer[np.ndarray, "P C B"]
     part: Int[np.ndarray, " K"]
     n_channels: int
     part_heights: tuple[float, ...]
@@ -64,7 +64,7 @@ def codebook(used: Bool[np.ndarray, "P C B"], part_heights: tuple[float, ...]) -
 
 
 def count(
-    bins: Int[np.ndarray, "C h w"],
+    bins: Integer[np.ndarray, "C h w"],
     boxes: Float[np.ndarray, "N 4"],
     book: Codebook,
     sampling: SamplingOptions,
@@ -87,7 +87,7 @@ def count(
 
 
 def _count_samples(
-    bins: Int[np.ndarray, "C h w"],
+    bins: Integer[np.ndarray, "C h w"],
     boxes: Float[np.ndarray, "N 4"],
     book: Codebook,
     grid: tuple[int, int],
@@ -119,7 +119,7 @@ def _count_samples(
 
 
 def _count_every_pixel(
-    bins: Int[np.ndarray, "C h w"], boxes: Float[np.ndarray, "N 4"], book: Codebook
+    bins: Integer[np.ndarray, "C h w"], boxes: Float[np.ndarray, "N 4"], book: Codebook
 ) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, "N P"]]:
     height, width = bins.shape[1:]
     # A pixel belongs to a box that holds its centre.

@@ -53,9 +53,12 @@ def run_in_process(assembly: Assembly) -> Iterator[Told]:
         truth = assembly.truth_message(frame)
         if truth is not None:
             yield truth
-    for name in nodes:
-        counters = cameras[name].counters if name in cameras else {}
-        yield telemetry[name].status(name, "done", scenario.frames - 1, network.counters[name], counters)
+        if frame in (0, scenario.frames - 1):
+            for name in nodes:
+                counters = cameras[name].counters if name in cameras else {}
+                yield telemetry[name].status(
+                    name, "running" if frame == 0 else "done", frame, network.counters[name], counters
+                )
     for source in sources.values():
         source.close()
 

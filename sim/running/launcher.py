@@ -80,6 +80,7 @@ class Launch:
                 if isinstance(message, EstimateMessage) and "first_estimate_s" not in self.results.timing:
                     self.results.timing["first_estimate_s"] = round(time.monotonic() - began, 3)
             elapsed = time.monotonic() - started
+            publish(session, self._assembly.scenario.name, ControlMessage("stop"))
             self.results.timing["frames_per_s"] = round(self._assembly.scenario.frames / elapsed, 2)
             self._tell_truth(session, self._assembly.scenario.frames)
         return self.results

@@ -1,5 +1,6 @@
 """What a run has found, collected estimate by estimate, and its summary."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -23,6 +24,7 @@ class Results:
         scenario: The scenario as run.
         tracks: Each estimator's messages by frame.
         truth: The truth by frame.
+        first_statuses: The status of each node after frame 0, whose messages are larger.
         statuses: The last status of each node.
         timing: What the launcher has timed, by the names of the summary.
     """
@@ -30,6 +32,7 @@ class Results:
     scenario: Scenario
     tracks: dict[Track, dict[int, EstimateMessage]] = field(default_factory=dict)
     truth: dict[int, TruthMessage] = field(default_factory=dict)
+    first_statuses: dict[str, StatusMessage] = field(default_factory=dict)
     statuses: dict[str, StatusMessage] = field(default_factory=dict)
     timing: dict[str, float] = field(default_factory=dict)
 
@@ -45,6 +48,8 @@ class Results:
                 self.tracks.setdefault((message.estimator, message.node), {})[message.frame] = message
             case TruthMessage():
                 self.truth[message.frame] = message
+            case StatusMessage(frame=0):
+                self.first_statuses[message.node] = message
             case StatusMessage():
                 self.statuses[message.node] = message
 
@@ -154,27 +159,34 @@ def _anees(results: Results, tracks: list[Track]) -> float | None:
 
 
 def _network(results: Results) -> dict[str, Any]:
-    """Messages and bytes as the transports counted them, to each receiver, in the mean of the frames."""
-    frames = results.scenario.frames
-    sent, octets = _total(results, "messages"), _total(results, "bytes")
+    """Messages and bytes as the transports counted them, to each receiver.
+
+    The figures a frame are means over the frames after frame 0, in which the cameras exchange what the target
+    looks like: its bytes stand apart.
+    """
+    frames = results.scenario.frames - 1
+    first, last = results.first_statuses, results.statuses
+    sent = _total(last, "messages")["consensus"] - _total(first, "messages")["consensus"]
+    at_start, octets = _total(first, "bytes"), _total(last, "bytes")
     return {
         "iterations": results.scenario.network.iterations,
-        "messages_per_frame": round(sent.get("consensus", 0) / frames, 3),
+        "messages_per_frame": round(sent / frames, 3),
         "bytes_per_frame": {
-            "dcpf": round(octets.get("consensus", 0) / frames, 1),
-            "cpf": round(octets.get("pixels", 0) / frames, 1),
+            "dcpf": round((octets["consensus"] - at_start["consensus"]) / frames, 1),
+            "cpf": round((octets["pixels"] - at_start["pixels"]) / frames, 1),
         },
-        "late": sum(int(_plain(status.counters.get("late"))) for status in results.statuses.values()),
-        "refused": int(sum(_total(results, "refused").values())),
+        "bytes_at_start": {"dcpf": at_start["consensus"], "cpf": at_start["pixels"]},
+        "late": sum(int(_plain(status.counters.get("late"))) for status in last.values()),
+        "refused": int(_total(last, "refused").total()),
     }
 
 
-def _total(results: Results, group: str) -> dict[str, float]:
-    total: dict[str, float] = {}
-    for status in results.statuses.values():
+def _total(statuses: Mapping[str, StatusMessage], group: str) -> Counter[str]:
+    total: Counter[str] = Counter()
+    for status in statuses.values():
         counted = status.counters.get(group)
         for kind, number in (counted if isinstance(counted, Mapping) else {}).items():
-            total[kind] = total.get(kind, 0) + number
+            total[kind] += int(number)
     return total
 
 
