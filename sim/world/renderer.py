@@ -1,0 +1,145 @@
+"""A camera's pictures of the simulated world.
+
+What does not move (the room, the occluders) is drawn once. People are then laid over it, far to near, each
+cut out where an occluder in front of them hides them; the sensor's noise comes last.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from nodes.camera import Camera
+from sim.world.background import empty_room
+from sim.world.figure import figure
+from sim.world.light import Sensor, gain_at
+from sim.world.mesh import Box, Layer, View, box_around, clip, is_empty, lay_over, sprite, union, views
+from sim.world.occluders import Occluder
+from sim.world.shadow import shadows
+from sim.world.world import World
+
+Picture = UInt8[np.ndarray, "H W 3"]
+_FALLOFF = 0.16  # a lens gives this much less light in the picture's corners
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Cover:
+    """What an occluder hides: its coverage of a box of the picture, 0 to 255."""
+
+    occluder: Occluder
+    box: Box
+    coverage: UInt8[np.ndarray, "H W"]
+
+
+class Renderer:
+    """Draws what one camera sees. The same world, camera and frame always give the same picture."""
+
+    def __init__(self, world: World, camera: Camera) -> None:
+        """Draws everything that does not move.
+
+        Args:
+            world: The world, with the seed of the run.
+            camera: The camera that looks at it.
+
+        Raises:
+            ValueError: The camera hangs outside the room.
+        """
+        self._world, self._camera = world, camera
+        self._limits: Box = (0, 0, camera.width_px, camera.height_px)
+        options = world.options
+        self._sensor = Sensor(camera, options.noise, options.lighting.camera_spread, world.seed)
+        self._falloff = _falloff(camera)
+        scene = empty_room(camera, options.room, world.interior)
+        self._covers = self._draw_occluders(scene)
+        self._scene = cv2.multiply(scene, cv2.merge([self._falloff] * 3), dtype=cv2.CV_8U)
+        self._lit: tuple[list[float], Picture] = ([1.0, 1.0, 1.0], self._scene)
+
+    def frame(self, index: int, time_s: float) -> Picture:
+        """The picture that the camera takes.
+
+        Args:
+            index: Number of the frame; the sensor's noise depends on it.
+            time_s: When it is taken, seconds since the run's first frame.
+
+        Returns:
+            Blue, green and red of every pixel.
+        """
+        gain = gain_at(self._world.light, time_s) * self._sensor.gain
+        picture = self._lit_scene(gain).copy()
+        viewer = self._camera.center[:2]
+        people = [(person, person.pose_at(time_s)) for person in self._world.people]
+        people.sort(key=lambda each: -float(np.linalg.norm(each[1].position - viewer)))
+        poses = [pose for _, pose in people]
+        bodies = views([figure(pose, person.palette) for person, pose in people], self._camera)
+        for pose, body, shadow in zip(poses, bodies, shadows(poses, self._camera), strict=True):
+            self._draw_person(picture, pose.position, body, shadow, gain)
+        return self._sensor.read_out(picture, index)
+
+    def _lit_scene(self, gain: Float[np.ndarray, " 3"]) -> Picture:
+        """What does not move, under a light; kept as long as the light stays the same."""
+        if gain.tolist() != self._lit[0]:
+            self._lit = (gain.tolist(), cv2.transform(self._scene, np.diag(gain)))
+        return self._lit[1]
+
+    def _draw_occluders(self, scene: Picture) -> list[_Cover]:
+        """Lays the occluders over the empty room, and remembers what each of them hides."""
+        viewer = self._camera.center[:2]
+        covers = []
+        for occluder in sorted(
+            self._world.occluders, key=lambda o: -float(np.linalg.norm(o.center - viewer))
+        ):
+            (seen,) = views([occluder.mesh], self._camera)
+            box = clip(seen.box, self._limits)
+            if is_empty(box):
+                continue
+            layer = sprite([seen.under(np.ones(3))], box)
+            part = _part(scene, box)
+            part[...] = lay_over(part, layer)
+            covers.append(_Cover(occluder, box, layer[..., 3]))
+        return covers
+
+    def _draw_person(
+        self,
+        picture: Picture,
+        point: Float[np.ndarray, " 2"],
+        body: View,
+        shadow: Layer,
+        gain: Float[np.ndarray, " 3"],
+    ) -> None:
+        """Lays a person over a picture, except where something in front hides them."""
+        box = clip(union(body.box, box_around(shadow.polygons)), self._limits)
+        if is_empty(box):
+            return
+        middle = self._falloff[(box[1] + box[3]) // 2, (box[0] + box[2]) // 2]
+        layer = sprite([shadow, body.under(gain * middle)], box)
+        hidden = self._hidden(point, box)
+        if hidden is not None:
+            layer = cv2.multiply(layer, cv2.merge([255 - hidden] * 4), scale=1 / 255)
+        part = _part(picture, box)
+        part[...] = lay_over(part, layer)
+
+    def _hidden(self, point: Float[np.ndarray, " 2"], box: Box) -> UInt8[np.ndarray, "H W"] | None:
+        """How far occluders in front of a point of the floor cover a box, 0 to 255; None if none does."""
+        hidden = None
+        for cover in self._covers:
+            shared = clip(box, cover.box)
+            if is_empty(shared) or not cover.occluder.may_hide(point, self._camera.center[:2]):
+                continue
+            if hidden is None:
+                hidden = np.zeros((box[3] - box[1], box[2] - box[0]), np.uint8)
+            part = _part(hidden, shared, box)
+            part[...] = np.maximum(part, _part(cover.coverage, shared, cover.box))
+        return hidden
+
+
+def _part(image: UInt8[np.ndarray, "..."], box: Box, of: Box = (0, 0, 0, 0)) -> UInt8[np.ndarray, "..."]:
+    """The view of a box in an image that shows the picture from the first corner of another box on."""
+    return image[box[1] - of[1] : box[3] - of[1], box[0] - of[0] : box[2] - of[0]]
+
+
+def _falloff(camera: Camera) -> Float[np.ndarray, "H W"]:
+    """The light that reaches every pixel through the lens: less towards the corners."""
+    across = np.linspace(-1, 1, camera.width_px, dtype=np.float32)
+    down = np.linspace(-1, 1, camera.height_px, dtype=np.float32)
+    return 1 - _FALLOFF / 2 * (down[:, None] ** 2 + across**2)
