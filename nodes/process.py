@@ -16,7 +16,7 @@ from network.messages import (
     EstimateMessage,
     PixelsMessage,
 )
-from network.transport import Transport
+from network.transport import Links, Transport
 from nodes.central import Central
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
@@ -125,20 +125,17 @@ class Shell:
         self.transport.send(self.telemetry.status(self.name, state, frame, self.transport.counters, counters))
 
 
-def run_camera(
-    node: SmartCamera, source: FrameSource, neighbors: Iterable[str], sink: str | None, shell: Shell
-) -> None:
+def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shell) -> None:
     """The life of a smart camera.
 
     Args:
         node: The camera.
         source: Its pictures.
-        neighbors: The nodes that it runs consensus with.
-        sink: The central node, if there is one.
+        links: Its neighbours, and the central node if there is one.
         shell: Its shell.
     """
     first = source.read(0)
-    if not shell.wait_for_start([*neighbors, *([sink] if sink else [])]):
+    if not shell.wait_for_start(links.neighbors + links.sinks):
         return
     confirmed, done = -1, -1
     for index in range(shell.frames):
@@ -149,9 +146,9 @@ def run_camera(
         image = source.read(index) if index else first
         deadline = shell.deadline(index)
         # pixels to the central node, which confirms them in lockstep
-        if sink is not None:
+        if links.sinks:
             if shell.pace.kind == "lockstep":
-                confirmed = _await_confirmation(sink, index - AHEAD, confirmed, shell)
+                confirmed = _await_confirmation(links.sinks[0], index - AHEAD, confirmed, shell)
             shell.transport.send(PixelsMessage(node.name, index, image))
         # local filter
         began = time.perf_counter()
@@ -165,6 +162,7 @@ def run_camera(
         done = index
         if index == 0:
             shell.report("running", index, dict(node.counters))
+    source.close()
     shell.report("done" if done == shell.frames - 1 else "failed", done, dict(node.counters))
     shell.wait_for_stop()
 

@@ -70,8 +70,8 @@ class VideoSource:
             if self._next > index:
                 return self._retrieve()
         raise SourceError(
-            f"{self._path}: the video ends after {self._first + self._next} frames, frame {self._first + index}"
-            f" was asked for: set frames to at most {max(self._next, 0)}"
+            f"{self._path}: the video ends after {self._first + self._next} frames, frame "
+            f"{self._first + index} was asked for: set frames to at most {max(self._next, 0)}"
         )
 
     def _retrieve(self) -> UInt8[np.ndarray, "H W 3"]:

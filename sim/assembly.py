@@ -12,6 +12,7 @@ from network.consensus import Consensus
 from network.graph import Graph
 from network.messages import TruthMessage, Visibility
 from network.streams import stream
+from network.transport import Links, links_of
 from nodes.camera import Camera
 from nodes.central import Central
 from nodes.filtering.observation import ObservationModel
@@ -58,6 +59,17 @@ class Assembly:
     def graph(self) -> Graph:
         """The communication graph."""
         return self.scenario.graph
+
+    @cached_property
+    def links(self) -> Mapping[str, Links]:
+        """The nodes, the central one last if there is one, and whom each exchanges messages with."""
+        return links_of(self.graph, [self.scenario.central.name] if self.scenario.baselines.cpf else [])
+
+    def prepare(self) -> None:
+        """Works out what all nodes share, before they part."""
+        _ = self.cameras, self.links, self.setup
+        if self.world is not None:
+            _ = self.world.interior
 
     @cached_property
     def world(self) -> World | None:
@@ -138,8 +150,7 @@ class Assembly:
 
     def smart_camera(self, name: str) -> SmartCamera:
         """A camera's node."""
-        network = self.scenario.network
-        neighbors = self.graph.neighbors(name)
+        network, neighbors = self.scenario.network, self.links[name].neighbors
         return SmartCamera(
             self.model(name),
             self.setup,

@@ -63,11 +63,11 @@ def _make(folder: Path) -> None:
 
 def _plot(report: dict[str, Any], folder: Path) -> None:
     # Matplotlib takes its time to import, and only this needs it.
-    from sim.pictures.plots import plot_comparison
+    from sim.pictures.comparison import plot_comparison
+    from sim.pictures.plots import write_figure
 
-    figure = plot_comparison({label: each["summaries"] for label, each in report.items()})
-    for suffix in ("svg", "png"):
-        figure.savefig(folder / f"comparison.{suffix}")
+    rows = [{**run, "scenario": label} for label, each in report.items() for run in each["summaries"]]
+    write_figure(plot_comparison(rows), folder / "comparison")
 
 
 def _print(report: dict[str, Any], folder: Path) -> None:

@@ -6,7 +6,9 @@ from typing import Annotated
 
 import typer
 
+from sim.assembly import Assembly
 from sim.commands.shared import Frames, Overrides, ScenarioPath, Seed, read_scenario
+from sim.scenario.parsing import ScenarioError
 
 Name = Annotated[str, typer.Argument(metavar="NAME", help="The camera.", show_default=False)]
 Listen = Annotated[
@@ -31,13 +33,19 @@ def node(
 ) -> None:
     """Run one node of a scenario; a `dcpf run --by-hand NAME` elsewhere starts its frames."""
     chosen = read_scenario(scenario, overrides, seed=seed, frames=frames, name=run_name)
-    # The node's needs are not the command line's: Zenoh and OpenCV take their time to import.
+    # The node's needs are not the command line's: Zenoh takes its time to import.
+    from sim.running.endpoints import hand_endpoints
     from sim.running.node import run_node, stop_on_signals
 
     logging.getLogger().setLevel(logging.INFO)
     stopped = threading.Event()
     stop_on_signals(stopped)
-    run_node(chosen, name, listen or [], connect or [], stopped)
+    assembly, usual = Assembly(chosen), hand_endpoints(chosen)
+    if name not in usual.nodes:
+        raise ScenarioError(f"{scenario}: has no node {name}: its nodes are {', '.join(usual.nodes)}")
+    run_node(
+        assembly, name, listen or [usual.nodes[name]], connect or usual.connects(name, assembly), stopped
+    )
 
 
 def central(

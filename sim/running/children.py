@@ -1,22 +1,20 @@
-"""The processes of a run: started, watched, and all ended whatever happens.
+"""The launcher's side of a run's processes: it starts their host, hears of them, and ends them all."""
 
-Each child holds the reading end of a pipe whose other end is the launcher's: when that closes, however the
-launcher ends, the child leaves by itself.
-"""
-
+import json
 import os
+import queue
+import shutil
 import subprocess
 import sys
-import time
-from collections.abc import Iterable, Iterator, Sequence
+import threading
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Self
 
 from network.errors import NetworkError
 from network.sessions import RUNTIME_ENVIRONMENT
 
-LEAVE_S = 3.0
-"""How long a process has to leave by itself before it is ended."""
+LEAVE_S = 8.0
+"""How long the host has for ending everybody before it is ended itself."""
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
@@ -25,96 +23,91 @@ class RunFailed(Exception):  # noqa: N818 - what it says is that the run failed
 
 
 class Children:
-    """The child processes of a launcher."""
+    """The processes of a run. None is left when it is closed.
 
-    def __init__(self, logs: Path) -> None:
-        """No child yet.
+    Attributes:
+        pids: The process of each node.
+    """
+
+    def __init__(self, scenario: Path, logs: Path, sockets: Path, by_hand: Sequence[str]) -> None:
+        """Starts them and waits until the router listens.
 
         Args:
-            logs: Folder of the children's logs.
-        """
-        self._logs = logs
-        self._router: subprocess.Popen[bytes] | None = None
-        self._nodes: dict[str, subprocess.Popen[bytes]] = {}
-        self._ended: set[str] = set()
+            scenario: The resolved scenario.
+            logs: Folder of their logs.
+            sockets: Folder of their sockets.
+            by_hand: Nodes that somebody else starts.
 
-    def __enter__(self) -> Self:
+        Raises:
+            NetworkError: The router's endpoint cannot be had.
+            RunFailed: The host could not start.
+        """
+        self._logs, self._sockets = logs, sockets
+        self._told: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
+        options = ["--logs", str(logs), "--sockets", str(sockets)]
+        options += [option for name in by_hand for option in ("--by-hand", name)]
+        with (logs / "host.log").open("wb") as log:
+            self._host = subprocess.Popen(
+                [sys.executable, "-m", "sim.running.host", str(scenario), *options],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                env=os.environ | RUNTIME_ENVIRONMENT | ONE_THREAD,
+                # Ctrl-C in the terminal is the launcher's business.
+                start_new_session=True,
+            )
+        try:
+            self.pids = self._started()
+        except BaseException:
+            self.close()
+            raise
+        threading.Thread(target=self._listen, name="host", daemon=True).start()
+
+    def __enter__(self) -> "Children":
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Ends them all: first by asking, then by force; the router goes last."""
-        for process in self._nodes.values():
-            _hang_up(process)
-        _end(self._nodes.values())
-        if self._router is not None:
-            _hang_up(self._router)
-            _end([self._router])
+        self.close()
 
-    def start_router(self, listen: Sequence[str], folder: Path) -> None:
-        """Starts the router and waits until it listens.
-
-        Args:
-            listen: Its endpoints.
-            folder: Of the sockets; the router removes it at the end.
+    def ended(self) -> list[tuple[str, int]]:
+        """The nodes that have ended since the last look, with their exit codes.
 
         Raises:
-            NetworkError: An endpoint cannot be had.
+            RunFailed: The host itself has ended, and with it everybody.
         """
-        options = [option for endpoint in listen for option in ("--listen", endpoint)]
-        command = [sys.executable, "-m", "sim.running.router", *options, "--sockets", str(folder)]
-        with (self._logs / "router.log").open("wb") as log:
-            self._router = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, start_new_session=True
-            )
-        said = self._router.stdout
-        if said is None or not said.readline():
-            raise NetworkError(self.last_words("router"))
-
-    def start(self, name: str, command: Sequence[str]) -> None:
-        """Starts a node."""
-        with (self._logs / f"{name}.log").open("wb") as log:
-            self._nodes[name] = subprocess.Popen(
-                command,
-                stdin=subprocess.PIPE,
-                stdout=log,
-                stderr=log,
-                env=os.environ | RUNTIME_ENVIRONMENT | ONE_THREAD,
-                start_new_session=True,
-            )
-
-    def ended(self) -> Iterator[tuple[str, int]]:
-        """The nodes that have ended, with their exit codes."""
-        for name, process in self._nodes.items():
-            code = process.poll()
-            if code is not None:
-                yield name, code
-
-    def pid(self, name: str) -> int:
-        """The process of a node."""
-        return self._nodes[name].pid
+        found = [self._told.get() for _ in range(self._told.qsize())]
+        if not found and self._host.poll() is not None:
+            raise RunFailed(f"the host of the run's processes ended: {self.last_words('host')}")
+        return found
 
     def last_words(self, name: str) -> str:
-        """The last line of a child's log."""
-        lines = (self._logs / f"{name}.log").read_text(errors="replace").strip().splitlines()
+        """The last line of a process's log."""
+        path = self._logs / f"{name}.log"
+        lines = path.read_text(errors="replace").strip().splitlines() if path.is_file() else []
         return lines[-1] if lines else "it said nothing"
 
+    def close(self) -> None:
+        """Ends them all: by hanging up, and if that does not help, by force."""
+        if self._host.stdin is not None:
+            self._host.stdin.close()
+        try:
+            self._host.wait(LEAVE_S)
+        except subprocess.TimeoutExpired:
+            # The nodes notice that their host is gone and leave by themselves.
+            self._host.kill()
+            self._host.wait()
+        shutil.rmtree(self._sockets, ignore_errors=True)
 
-def _hang_up(process: subprocess.Popen[bytes]) -> None:
-    """Closes the pipe that tells a child that its launcher is there."""
-    if process.stdin is not None:
-        process.stdin.close()
+    def _started(self) -> dict[str, int]:
+        line = self._host.stdout.readline() if self._host.stdout else b""
+        if line:
+            pids: dict[str, int] = json.loads(line)["started"]
+            return pids
+        if self._host.wait() == 2:
+            raise NetworkError(self.last_words("host"))
+        raise RunFailed(f"the host of the run's processes could not start: {self.last_words('host')}")
 
-
-def _end(processes: Iterable[subprocess.Popen[bytes]]) -> None:
-    limit = time.monotonic() + LEAVE_S
-    waiting = list(processes)
-    for end in (subprocess.Popen.terminate, subprocess.Popen.kill):
-        for process in waiting:
-            try:
-                process.wait(max(0.0, limit - time.monotonic()))
-            except subprocess.TimeoutExpired:
-                end(process)
-        limit = time.monotonic() + 1.0
-        waiting = [process for process in waiting if process.poll() is None]
-    for process in waiting:
-        process.wait()
+    def _listen(self) -> None:
+        for line in self._host.stdout or ():
+            said = json.loads(line)
+            self._told.put((said["ended"], said["code"]))

@@ -1,10 +1,10 @@
 """Where the processes of a run find each other: sockets in a folder, or ports for nodes by hand."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from network.graph import Graph
+from sim.assembly import Assembly
 from sim.scenario.model import Scenario
 
 FIRST_PORT = 7448
@@ -23,26 +23,32 @@ class Endpoints:
     router: str
     nodes: Mapping[str, str]
 
-    def connects(self, name: str, graph: Graph, sink: str | None) -> list[str]:
+    def connects(self, name: str, assembly: Assembly) -> list[str]:
         """Whom a node connects to: the router, and of each pair of linked nodes the later to the earlier."""
-        if name == sink:
-            linked = graph.names
-        else:
-            linked = tuple(other for other in graph.neighbors(name) if other < name)
+        links = assembly.links[name]
+        linked = links.cameras or tuple(other for other in links.neighbors if other < name)
         return [self.router, *(self.nodes[other] for other in linked)]
 
 
-def in_folder(folder: Path, scenario: Scenario) -> Endpoints:
-    """Unix sockets in a folder: the fastest, and free of ports."""
+def run_endpoints(scenario: Scenario, folder: Path, by_hand: Sequence[str]) -> Endpoints:
+    """The endpoints of a run that is launched.
+
+    Args:
+        scenario: Resolved.
+        folder: Of sockets: the fastest, and free of ports.
+        by_hand: Nodes that somebody else starts; if there are any, nobody can be told of our folder.
+    """
+    router = f"unixsock-stream/{folder}/r"
+    if by_hand:
+        return Endpoints(router, hand_endpoints(scenario).nodes)
+    # Short names: a socket's path has 107 characters at most.
     return Endpoints(
-        f"unixsock-stream/{folder}/r",
-        # Short names: a socket's path has 107 characters at most.
-        {name: f"unixsock-stream/{folder}/{index}" for index, name in enumerate(_names(scenario))},
+        router, {name: f"unixsock-stream/{folder}/{index}" for index, name in enumerate(_names(scenario))}
     )
 
 
-def by_hand(scenario: Scenario) -> Endpoints:
-    """The endpoints that the scenario names, or ports of the loopback interface."""
+def hand_endpoints(scenario: Scenario) -> Endpoints:
+    """The endpoints that the scenario names for nodes by hand, or ports of the loopback interface."""
     return Endpoints(
         scenario.network.router,
         {

@@ -15,7 +15,6 @@ from network.messages import (
     StatusMessage,
     TruthMessage,
 )
-from network.transport import links_of
 from nodes.central import Central
 from nodes.smart_camera import SmartCamera
 from nodes.telemetry import Telemetry
@@ -38,7 +37,7 @@ def run_in_process(assembly: Assembly) -> Iterator[Told]:
     sources = {name: assembly.source(name) for name in cameras}
     central = assembly.central() if scenario.baselines.cpf else None
     nodes: Nodes = {**cameras, central.name: central} if central else cameras
-    network = MemoryNetwork(scenario.name, links_of(assembly.graph, [central.name] if central else []))
+    network = MemoryNetwork(scenario.name, assembly.links)
     telemetry = {name: Telemetry() for name in nodes}
     for frame in range(scenario.frames):
         for name, camera in cameras.items():

@@ -2,11 +2,10 @@
 
 import logging
 import queue
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import zenoh
@@ -17,7 +16,7 @@ from network.messages import ControlMessage, EstimateMessage, StatusMessage, Tru
 from network.zenoh import publish
 from sim.assembly import Assembly
 from sim.running.children import Children, RunFailed
-from sim.running.endpoints import Endpoints, by_hand, in_folder
+from sim.running.endpoints import run_endpoints
 from sim.running.recorder import Recorder, expected_tracks
 from sim.running.results import Results
 
@@ -67,9 +66,13 @@ class Launch:
             KeyboardInterrupt: It was interrupted; every process has ended.
         """
         began = time.monotonic()
+        folder = Path(tempfile.mkdtemp(prefix="dcpf-"))
+        recorded = self._recorder.folder
         with ExitStack() as stack:
-            endpoints, children = stack.enter_context(self._processes())
-            session = sessions.open_client(endpoints.router)
+            children = stack.enter_context(
+                Children(recorded / "scenario.yaml", recorded / "logs", folder, self._by_hand)
+            )
+            session = sessions.open_client(run_endpoints(self._assembly.scenario, folder, []).router)
             stack.callback(sessions.close, session)
             self._listen(session)
             self._wait_until_ready(children)
@@ -85,35 +88,9 @@ class Launch:
             self._tell_truth(session, self._assembly.scenario.frames)
         return self.results
 
-    @contextmanager
-    def _processes(self) -> Iterator[tuple[Endpoints, Children]]:
-        """The router and the nodes; none of them is left at the end."""
-        scenario, graph = self._assembly.scenario, self._assembly.graph
-        folder = Path(tempfile.mkdtemp(prefix="dcpf-"))
-        endpoints = in_folder(folder, scenario)
-        if self._by_hand:
-            # Who is started by hand, perhaps on another host, cannot be told of our folder.
-            endpoints = Endpoints(endpoints.router, by_hand(scenario).nodes)
-        sink = scenario.central.name if scenario.baselines.cpf else None
-        with Children(self._recorder.folder / "logs") as children:
-            children.start_router([endpoints.router, scenario.network.router], folder)
-            for name in sorted(self._nodes - set(self._by_hand)):
-                command = [
-                    sys.executable,
-                    "-m",
-                    "sim.running.node",
-                    str(self._recorder.folder / "scenario.yaml"),
-                    name,
-                ]
-                command += ["--listen", endpoints.nodes[name]]
-                for endpoint in endpoints.connects(name, graph, sink):
-                    command += ["--connect", endpoint]
-                children.start(name, command)
-            yield endpoints, children
-
     def _listen(self, session: zenoh.Session) -> None:
         run = self._assembly.scenario.name
-        hear = zenoh.handlers.Callback(self._heard.put)
+        hear = zenoh.handlers.Callback(self._heard.put, indirect=False)
         session.declare_subscriber(keys.estimate(run), hear)
         session.declare_subscriber(keys.status(run), hear)
         session.liveliness().declare_subscriber(keys.alive(run), hear, history=True)

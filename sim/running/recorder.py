@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Self, TextIO
+from typing import Any, TextIO
 
 from network.codec import decode_public, encode_public
 from network.errors import RefusedMessage
@@ -68,7 +68,7 @@ class Recorder:
         except OSError as error:
             raise _cannot_write(folder, error) from error
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "Recorder":
         return self
 
     def __exit__(self, *_: object) -> None:

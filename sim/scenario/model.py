@@ -1,7 +1,7 @@
 """The scenario: what a file can say. It composes the options that stand beside the things they configure."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -48,7 +48,7 @@ class CameraOptions(Options):
     """What the video must hash to; written into the folder of a run."""
 
     @model_validator(mode="after")
-    def _one_way(self) -> Self:
+    def _one_way(self) -> "CameraOptions":
         looks = [self.position, self.look_at, self.focal_px]
         matrices = [self.K, self.R, self.t]
         ways = [any(v is not None for v in way) for way in (looks, matrices)] + [self.calibration is not None]
@@ -83,7 +83,7 @@ class FootageOptions(Options):
     """Frame of the videos, and of the ground truth, with which the run begins."""
 
     @model_validator(mode="after")
-    def _one_place(self) -> Self:
+    def _one_place(self) -> "FootageOptions":
         if (self.name is None) == (self.folder is None):
             raise ValueError("footage needs name or folder: what `dcpf footage` fetches, or your own")
         return self
@@ -157,13 +157,13 @@ class Scenario(Options):
     """What DCPF is compared with."""
 
     @model_validator(mode="after")
-    def _world_or_footage(self) -> Self:
+    def _world_or_footage(self) -> "Scenario":
         if (self.world is None) == (self.footage is None):
             raise ValueError("a scenario needs world or footage, one of them: add or remove one")
         return self
 
     @model_validator(mode="after")
-    def _names(self) -> Self:
+    def _names(self) -> "Scenario":
         names = [camera.name for camera in self.cameras]
         for name in names:
             if names.count(name) > 1:
@@ -173,7 +173,7 @@ class Scenario(Options):
         return self
 
     @model_validator(mode="after")
-    def _target(self) -> Self:
+    def _target(self) -> "Scenario":
         target = self.target
         if self.world is not None:
             people = [person.name for person in self.world.people]
@@ -191,7 +191,7 @@ class Scenario(Options):
         return self
 
     @model_validator(mode="after")
-    def _network(self) -> Self:
+    def _network(self) -> "Scenario":
         graph = self.graph
         graph.require_connected()
         self.network.consensus.require_convergence(graph.max_degree)
