@@ -20,7 +20,7 @@ from network.transport import Links, Transport
 from nodes.central import Central
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
-from nodes.telemetry import Telemetry
+from nodes.telemetry import Counters, State, Telemetry
 
 AHEAD = 2
 """Frames that a camera may be ahead of the last one that the sink of its pictures has confirmed."""
@@ -118,9 +118,7 @@ class Shell:
         left = self._start_s + (index + 1) / self.pace.rate_hz - time.time()
         return time.monotonic() + left
 
-    def report(
-        self, state: Literal["ready", "running", "done", "failed"], frame: int, counters: dict[str, int]
-    ) -> None:
+    def report(self, state: State, frame: int, counters: Counters) -> None:
         """Tells everybody how the node is."""
         self.transport.send(self.telemetry.status(self.name, state, frame, self.transport.counters, counters))
 
@@ -161,9 +159,9 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         shell.telemetry.consensus_round_s.append((time.perf_counter() - began) / max(node.rounds_done, 1))
         done = index
         if index == 0:
-            shell.report("running", index, dict(node.counters))
+            shell.report("running", index, node.counters)
     source.close()
-    shell.report("done" if done == shell.frames - 1 else "failed", done, dict(node.counters))
+    shell.report("done" if done == shell.frames - 1 else "failed", done, node.counters)
     shell.wait_for_stop()
 
 

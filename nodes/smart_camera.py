@@ -40,8 +40,6 @@ class SmartCamera:
 
     Attributes:
         name: The camera's name, which is the node's.
-        counters: Frames in which the local (`indefinite_local`) or the fused (`indefinite_fused`) difference
-            of information matrices was not positive semidefinite, so that Eq. 17's ratio was no density.
     """
 
     def __init__(
@@ -63,7 +61,7 @@ class SmartCamera:
             with_single: Whether to run the camera's own filter beside, as a baseline.
         """
         self.name = model.camera.name
-        self.counters: Counter[str] = Counter(indefinite_local=0, indefinite_fused=0)
+        self._indefinite: Counter[str] = Counter(indefinite_local=0, indefinite_fused=0)
         self._model, self._setup, self._consensus, self._cameras = model, setup, consensus, set(cameras)
         self._motion = setup.motion
         self._fusion_rng = setup.stream(self.name, "fusion")
@@ -89,7 +87,7 @@ class SmartCamera:
         predicted = propagate(self._particles, self._motion, self._fusion_rng)
         # reweight by the own picture: u, p, v, r
         local = self._filter_locally(picture, predicted)
-        self.counters["indefinite_local"] += not is_density(local, self._setup.fusion)
+        self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
         self._frame = FrameInProgress(index, image, picture, predicted)
         return self._with_result(self._consensus.begin(index, pack(local, self._setup.fusion)))
@@ -112,6 +110,16 @@ class SmartCamera:
     def waiting_for(self) -> tuple[str, ...]:
         """Neighbours without whose message the frame cannot go on; none when it is done."""
         return self._consensus.waiting_for()
+
+    @property
+    def counters(self) -> dict[str, int | dict[str, int]]:
+        """What it has counted.
+
+        Frames in which the local (`indefinite_local`) or the fused (`indefinite_fused`) difference of
+        information matrices was not positive semidefinite, so that Eq. 17 had no density; and messages
+        of the rounds that were of no use, by reason (`unused`).
+        """
+        return {**self._indefinite, "unused": dict(self._consensus.counters)}
 
     @property
     def rounds_done(self) -> int:
@@ -144,7 +152,7 @@ class SmartCamera:
         setup = self._setup
         # sum: N times the average (Eq. 15-16)
         fused = unpack(self._consensus.value, len(self._cameras), len(setup.start.mean), setup.fusion)
-        self.counters["indefinite_fused"] += not fused.is_density
+        self._indefinite["indefinite_fused"] += not fused.is_density
         # reweight, from the prior or the optimal proposal (Eq. 17)
         posterior = fuse(
             self._particles, frame.predicted, fused, self._motion, setup.fusion, self._fusion_rng

@@ -1,7 +1,7 @@
 """Where a camera's pictures come from: anything that gives frame after frame. Video files live here."""
 
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import cv2
 import numpy as np
@@ -12,6 +12,7 @@ class SourceError(Exception):
     """A picture cannot be had; the text names the file and what to do."""
 
 
+@runtime_checkable
 class FrameSource(Protocol):
     """Gives the pictures of one camera."""
 

@@ -10,6 +10,8 @@ from network.messages import StatusMessage
 from network.transport import Traffic
 
 State = Literal["ready", "running", "done", "failed"]
+Counters = Mapping[str, int | Mapping[str, int]]
+"""What a node has counted, by name; groups by name and reason."""
 
 
 @dataclass(slots=True)
@@ -27,7 +29,7 @@ class Telemetry:
     late: int = 0
 
     def status(
-        self, node: str, state: State, frame: int, traffic: Traffic, counters: Mapping[str, int]
+        self, node: str, state: State, frame: int, traffic: Traffic, counters: Counters
     ) -> StatusMessage:
         """The status after a frame.
 
@@ -48,7 +50,7 @@ class Telemetry:
             frame=frame,
             counters={
                 "late": self.late,
-                **counters,
+                **{name: dict(n) if isinstance(n, Mapping) else n for name, n in counters.items()},
                 "messages": dict(traffic.messages),
                 "bytes": dict(traffic.bytes),
                 "refused": dict(traffic.refused),

@@ -80,7 +80,8 @@ class Launch:
             started = time.monotonic()
             for message in self._messages(children):
                 self._take(message, session)
-                if isinstance(message, EstimateMessage) and "first_estimate_s" not in self.results.timing:
+                first = isinstance(message, EstimateMessage) and message.frame == 1
+                if first and "first_estimate_s" not in self.results.timing:
                     self.results.timing["first_estimate_s"] = round(time.monotonic() - began, 3)
             elapsed = time.monotonic() - started
             publish(session, self._assembly.scenario.name, ControlMessage("stop"))

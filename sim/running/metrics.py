@@ -41,11 +41,18 @@ def anees(
     """Average normalised estimation error squared of the position, over its axes: 1 if the filter knows.
 
     Bar-Shalom, Li & Kirubarajan (2001), section 5.4: e^T P^-1 e has the position's number of axes as mean.
+
+    Returns:
+        NaN without any estimate, infinity where a covariance is singular: that filter claims no doubt.
     """
     n_axes = truth.shape[1] // 2
     there = ~np.isnan(means[:, 0])
     error = (means - truth)[there, :n_axes]
     P = covariances[there, :n_axes, :n_axes]
+    if not len(P):
+        return float("nan")
+    if np.linalg.matrix_rank(P, hermitian=True).min() < n_axes:
+        return float("inf")
     whitened = np.linalg.solve(P, error[:, :, None])[:, :, 0]
     return float(np.mean(np.sum(error * whitened, axis=1)) / n_axes)
 

@@ -25,7 +25,7 @@ class Results:
         tracks: Each estimator's messages by frame.
         truth: The truth by frame.
         first_statuses: The status of each node after frame 0, whose messages are larger.
-        statuses: The last status of each node.
+        statuses: The last status of each node that could tell it.
         timing: What the launcher has timed, by the names of the summary.
     """
 
@@ -48,9 +48,9 @@ class Results:
                 self.tracks.setdefault((message.estimator, message.node), {})[message.frame] = message
             case TruthMessage():
                 self.truth[message.frame] = message
-            case StatusMessage(frame=0):
+            case StatusMessage(state="running"):
                 self.first_statuses[message.node] = message
-            case StatusMessage():
+            case StatusMessage(state="done" | "failed"):
                 self.statuses[message.node] = message
 
     def means(self, track: Track) -> Float[np.ndarray, "T D"]:
@@ -153,19 +153,20 @@ def _anees(results: Results, tracks: list[Track]) -> float | None:
     truth = results.true_states()
     if truth is None or not tracks:
         return None
-    return _number(
-        float(np.mean([anees(results.means(t)[1:], results.covariances(t)[1:], truth[1:]) for t in tracks]))
-    )
+    each = np.array([anees(results.means(t)[1:], results.covariances(t)[1:], truth[1:]) for t in tracks])
+    known = each[~np.isnan(each)]
+    return _number(float(known.mean())) if known.size else None
 
 
 def _network(results: Results) -> dict[str, Any]:
     """Messages and bytes as the transports counted them, to each receiver.
 
     The figures a frame are means over the frames after frame 0, in which the cameras exchange what the target
-    looks like: its bytes stand apart.
+    looks like: its bytes stand apart. Nodes that died on the way have told no total and are left out.
     """
     frames = results.scenario.frames - 1
-    first, last = results.first_statuses, results.statuses
+    last = results.statuses
+    first = {node: status for node, status in results.first_statuses.items() if node in last}
     sent = _total(last, "messages")["consensus"] - _total(first, "messages")["consensus"]
     at_start, octets = _total(first, "bytes"), _total(last, "bytes")
     return {
@@ -178,6 +179,7 @@ def _network(results: Results) -> dict[str, Any]:
         "bytes_at_start": {"dcpf": at_start["consensus"], "cpf": at_start["pixels"]},
         "late": sum(int(_plain(status.counters.get("late"))) for status in last.values()),
         "refused": int(_total(last, "refused").total()),
+        "unused": dict(_total(last, "unused")),
     }
 
 

@@ -94,9 +94,10 @@ def _calibrated(options: CameraOptions, folder: Path, listed: Mapping[str, Camer
         listed = read_qualisys(file)
     if options.position is None and options.K is None:
         if options.name not in listed:
+            known = f", or one of the names {', '.join(listed)}" if listed else ""
             raise CalibrationError(
-                f"camera {options.name} is not calibrated: give it position, look_at and focal_px, or K, R and"
-                f" t, or calibration{', or one of the names ' + ', '.join(listed) if listed else ''}"
+                f"camera {options.name} is not calibrated: give it position, look_at and focal_px, or K, R, t"
+                f", or calibration{known}"
             )
         return listed[options.name]
     return _matrices(options)
