@@ -8,7 +8,7 @@ import logging
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from network.graph import Graph
 from network.messages import (
@@ -101,6 +101,7 @@ class Traffic:
         self.refused[reason] += 1
 
 
+@runtime_checkable
 class Transport(Protocol):
     """A node's way to the others.
 

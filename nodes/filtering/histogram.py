@@ -99,16 +99,17 @@ def _count_samples(
     row_part = np.clip(np.searchsorted(book.part_edges, rows, side="right") - 1, 0, n_parts - 1)
     # Samples outside fall on a border one pixel wide, which has a code of its own: n_codes + 1.
     left, top, right, bottom = boxes.T[:, :, None]
-    x = np.clip(np.floor(left + columns * (right - left)), -1, width - 2).astype(np.intp) + 1
-    y = np.clip(np.floor(top + rows * (bottom - top)), -1, height - 2).astype(np.intp) + 1
-    index = ((row_part * height + y) * width)[:, :, None] + x[:, None, :]
+    # 32-bit indices: the arrays of all samples are what this function's time goes to.
+    x = np.clip(np.floor(left + columns * (right - left)), -1, width - 2).astype(np.int32) + 1
+    y = np.clip(np.floor(top + rows * (bottom - top)), -1, height - 2).astype(np.int32) + 1
+    index = ((row_part.astype(np.int32) * height + y) * width)[:, :, None] + x[:, None, :]
     offset = (n_codes + 2) * np.arange(len(boxes), dtype=np.intp)[:, None, None]
     total = np.zeros((len(boxes), n_codes + 2), dtype=np.intp)
     for channel, channel_bins in enumerate(bins):
         coded = np.full((n_parts, height, width), n_codes + 1, dtype=np.uint16)
         for part in range(n_parts):
             coded[part, 1:-1, 1:-1] = book.codes[part, channel].take(channel_bins)
-        sampled = coded.take(index) + offset
+        sampled = coded.take(index, mode="clip") + offset
         total += np.bincount(sampled.ravel(), minlength=total.size).reshape(total.shape)
     # Samples of a part that lie inside, from the separable grid
     inside_x = ((x > 0) & (x < width - 1)).sum(axis=1)

@@ -39,8 +39,8 @@ class TargetOptions(Options):
     """Height of the plane above the floor, in m; the target stands on it (people's feet: 0)."""
     height: float = Field(default=1.75, gt=0)
     """Height of the target, in m."""
-    width: float = Field(default=0.48, gt=0)
-    """Width of the target, in m."""
+    width: float = Field(default=0.4, gt=0)
+    """Width of the target, in m; of a person the trunk, so that boxes show more of them than of the room."""
     start: StartOptions = StartOptions()
     """The target at frame 0."""
 

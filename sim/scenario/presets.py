@@ -27,15 +27,20 @@ ROBUST: Mapping[str, Any] = {
         "color": {"space": "joint_rgb", "bins_per_channel": 6, "gain_correction": True},
         "sampling": {"grid": [15, 15], "kernel": "epanechnikov"},
         "likelihood": {"calibration": "background"},
+        "model_update": {"alpha": 0.1},
     },
     "fusion": {"rule": "net_information", "local_particles": "shared", "proposal": "optimal"},
 }
 """Joint colours without the camera's gain, a likelihood set from the background, net information."""
 
 PERSON_PARTS: Mapping[str, Any] = {
-    "filter": {"color": {"parts": [0.14, 0.38, 0.48], "part_weights": [0.2, 0.45, 0.35]}}
+    "filter": {
+        "color": {"parts": [0.14, 0.38, 0.48], "part_weights": [0.2, 0.45, 0.35]},
+        "sampling": {"grid": [12, 24]},
+    }
 }
-"""Head, torso and legs: what the robust preset tells apart in a target that stands on a plane."""
+"""Head, torso and legs: what the robust preset tells apart in a target that stands on a plane, and the
+rows of samples to do so."""
 
 
 def preset_defaults(data: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -1,0 +1,161 @@
+"""Distances against OpenCV's, Eq. 4 by hand, and what cameras tell each other about the target's looks."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nodes.filtering.appearance import (
+    Appearance,
+    ModelUpdateOptions,
+    full_codebook,
+    normalize_counts,
+    pack_looks,
+    reference_codebook,
+    squared_distances,
+    unpack_looks,
+    update_appearance,
+)
+from nodes.filtering.color import ColorOptions
+
+JOINT = ColorOptions(space="joint_rgb", bins_per_channel=2)
+RGB = ColorOptions(bins_per_channel=4)
+PARTS = ColorOptions(bins_per_channel=4, parts=(0.2, 0.8), part_weights=(0.3, 0.7))
+seeds = st.integers(0, 2**32 - 1)
+
+
+def random_counts(rng, options, n_boxes, n_pixels=50):
+    """Counts of every bin: (N, P, C, B), each histogram of as many pixels."""
+    shape = (n_boxes, len(options.parts), options.n_channels)
+    shares = rng.dirichlet(np.full(options.n_bins, 0.3), shape)
+    return rng.multinomial(n_pixels, shares)
+
+
+def appearance_of(histograms, **changes):
+    return replace(Appearance(histograms, histograms, 0.2, 0.02, own=True), **changes)
+
+
+def distances(counts, reference, options, n_pixels=50):
+    """d² by way of the bins that the reference holds only."""
+    book = reference_codebook(reference, options)
+    pixels = np.full((len(counts), len(options.parts)), n_pixels)
+    return squared_distances(counts[:, reference > 0], pixels, reference, book, options)
+
+
+@given(seeds)
+def test_the_distance_is_opencvs_hellinger_distance_squared(seed):
+    rng = np.random.default_rng(seed)
+    counts = random_counts(rng, JOINT, 6)
+    reference = counts[0] / 50
+    expected = [
+        cv2.compareHist(
+            box.ravel().astype(np.float32), reference.ravel().astype(np.float32), cv2.HISTCMP_HELLINGER
+        )
+        ** 2
+        for box in counts
+    ]
+    np.testing.assert_allclose(distances(counts, reference, JOINT), expected, atol=1e-6)
+
+
+@given(seeds)
+def test_channels_count_alike_and_parts_by_their_weights(seed):
+    rng = np.random.default_rng(seed)
+    counts = random_counts(rng, PARTS, 4)
+    reference = random_counts(rng, PARTS, 1)[0] / 50
+    coefficient = np.sqrt(counts / 50 * reference).sum(axis=-1)  # of each box, part and channel
+    expected = 1 - coefficient.mean(axis=-1) @ PARTS.part_weights
+    np.testing.assert_allclose(distances(counts, reference, PARTS), expected, atol=1e-12)
+
+
+def test_the_same_histogram_has_no_distance_and_another_one_has_one():
+    counts = np.zeros((2, 1, 3, 4), int)
+    counts[0, ..., 0] = counts[1, ..., 3] = 50
+    np.testing.assert_allclose(distances(counts, counts[0] / 50, RGB), [0, 1], atol=1e-15)
+
+
+@given(seeds)
+def test_a_distance_is_never_negative(seed):
+    counts = random_counts(np.random.default_rng(seed), PARTS, 3)
+    assert min(distances(counts, counts[0] / 50, PARTS)) >= 0
+
+
+def test_parts_outside_the_picture_do_not_count():
+    rng = np.random.default_rng(0)
+    counts, reference = random_counts(rng, PARTS, 1), random_counts(rng, PARTS, 1)[0] / 50
+    book = full_codebook(PARTS)
+    reference = np.maximum(reference, 1e-9)  # every bin is told apart
+    codes = counts.reshape(1, -1)
+    torso_only = codes * (book.part == 1)
+    found = squared_distances(torso_only, np.array([[0, 50]]), reference, book, PARTS)
+    assert found[0] == pytest.approx(1 - np.sqrt(counts[0, 1] / 50 * reference[1]).sum(axis=-1).mean())
+    nothing = squared_distances(0 * codes, np.array([[0, 0]]), reference, book, PARTS)
+    assert nothing[0] == 1
+
+
+def test_parts_that_the_reference_has_not_seen_do_not_count():
+    counts = random_counts(np.random.default_rng(1), PARTS, 1)
+    reference = counts[0] / 50
+    reference[0] = 0
+    assert distances(counts, reference, PARTS)[0] == pytest.approx(0, abs=1e-12)
+
+
+def test_normalised_histograms_add_up_to_one_or_were_not_seen():
+    counts = random_counts(np.random.default_rng(2), PARTS, 1)[0]
+    counts[1] = 0
+    histograms = normalize_counts(counts.ravel(), np.array([50, 0]), PARTS)
+    np.testing.assert_allclose(histograms.sum(axis=-1), [[1, 1, 1], [0, 0, 0]])
+
+
+def test_the_update_is_equation_4():
+    old, new = np.array([[[0.5, 0.5, 0, 0]]]), np.array([[[0.1, 0.2, 0.3, 0.4]]])
+    options = ModelUpdateOptions(alpha=0.1, gated=False)
+    updated = update_appearance(appearance_of(old), new, 0.9, 0.2, options)
+    np.testing.assert_allclose(updated.histograms, [[[0.46, 0.47, 0.03, 0.04]]])
+    np.testing.assert_array_equal(updated.first, old)
+
+
+def test_the_anchor_keeps_some_of_the_first_model_for_ever():
+    old, new = np.array([[[1.0, 0, 0, 0]]]), np.array([[[0, 0, 0, 1.0]]])
+    options = ModelUpdateOptions(alpha=0.5, anchor=0.1)
+    appearance = appearance_of(old)
+    for _ in range(200):
+        appearance = update_appearance(appearance, new, 0.0, 1.0, options)
+    # fixed point of h = 0.9 (0.5 h + 0.5 new) + 0.1 first
+    expected = (0.45 * new + 0.1 * old) / 0.55
+    np.testing.assert_allclose(appearance.histograms, expected)
+
+
+@pytest.mark.parametrize(
+    ("options", "distance", "visible"),
+    [
+        (ModelUpdateOptions(alpha=0.5), 0.0, 0.89),  # not enough of it in the picture
+        (ModelUpdateOptions(alpha=0.5), 0.141, 1.0),  # hidden: farther than 0.7 d₀² = 0.14
+        (ModelUpdateOptions(alpha=0.0), 0.0, 1.0),
+        (ModelUpdateOptions(alpha=0.5, gated=False), 0.0, 0.0),  # nothing to see
+    ],
+)
+def test_the_gate_is_closed_where_the_target_is_not_seen_well(options, distance, visible):
+    appearance = appearance_of(np.array([[[1.0, 0, 0, 0]]]))
+    assert update_appearance(appearance, appearance.histograms, distance, visible, options) is appearance
+
+
+@given(seeds, st.integers(1, 5), st.integers(0, 3))
+def test_a_blind_camera_is_told_the_mean_of_those_that_saw(seed, n_seeing, n_blind):
+    rng = np.random.default_rng(seed)
+    seen = [
+        appearance_of(random_counts(rng, PARTS, 1)[0] / 50, miss_distance=rng.random(), variance=rng.random())
+        for _ in range(n_seeing)
+    ]
+    packed = [pack_looks(each, PARTS) for each in (*seen, *[None] * n_blind)]
+    told = unpack_looks(np.mean(packed, axis=0), PARTS)
+    np.testing.assert_allclose(told.histograms, np.mean([each.histograms for each in seen], axis=0))
+    assert told.miss_distance == pytest.approx(np.mean([each.miss_distance for each in seen]))
+    assert told.variance == pytest.approx(np.mean([each.variance for each in seen]))
+    assert not told.own
+
+
+def test_nobody_saw_anything():
+    assert unpack_looks(pack_looks(None, PARTS), PARTS) is None

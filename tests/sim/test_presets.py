@@ -1,0 +1,77 @@
+"""Presets: they fill what a file leaves unsaid, and nothing else."""
+
+import pytest
+
+from network.weights import ConstantWeights, MetropolisWeights
+from sim.scenario.loading import load_scenario
+from sim.scenario.presets import PAPER, PERSON_PARTS, ROBUST, preset_defaults
+
+CONSTANT = ("network.consensus", "{algorithm: constant, epsilon: 0.2}")
+
+
+def test_the_robust_preset_is_the_one_where_none_is_named(small):
+    unsaid = load_scenario(small)
+    named = load_scenario(small, [("preset", "robust")])
+
+    assert unsaid == named
+    assert unsaid.fusion.rule == "net_information"
+    assert isinstance(unsaid.network.consensus, MetropolisWeights)
+
+
+def test_the_paper_preset_is_the_paper(small):
+    paper = load_scenario(small, [("preset", "paper"), ("network.iterations", "12")])
+
+    assert paper.fusion.rule == "eq17"
+    assert paper.fusion.local_particles == "own"
+    assert paper.filter.color.space == "rgb"
+    assert paper.filter.color.bins_per_channel == 8
+    assert paper.network.consensus == ConstantWeights(epsilon=0.325)
+
+
+@pytest.mark.parametrize("preset", ["paper", "robust"])
+def test_what_the_file_says_wins(small, preset):
+    chosen = load_scenario(
+        small, [("preset", preset), ("fusion.proposal", "prior"), ("filter.color.bins_per_channel", "5")]
+    )
+
+    assert chosen.filter.n_particles == 40
+    assert chosen.network.iterations == 3
+    assert chosen.fusion.proposal == "prior"
+    assert chosen.filter.color.bins_per_channel == 5
+
+
+def test_another_algorithm_leaves_the_presets_epsilon_behind(small):
+    chosen = load_scenario(small, [("preset", "paper"), ("network.consensus", "{algorithm: metropolis}")])
+
+    assert chosen.network.consensus == MetropolisWeights()
+    assert chosen.fusion.rule == "eq17"
+
+
+def test_another_epsilon_alone_keeps_the_presets_algorithm(small):
+    chosen = load_scenario(small, [("preset", "paper"), ("network.consensus.epsilon", "0.2")])
+
+    assert chosen.network.consensus == ConstantWeights(epsilon=0.2)
+
+
+def test_the_robust_preset_takes_another_algorithm_with_its_options(small):
+    assert load_scenario(small, [CONSTANT]).network.consensus == ConstantWeights(epsilon=0.2)
+
+
+def test_only_a_person_has_head_torso_and_legs():
+    assert preset_defaults({})["filter"]["color"]["parts"] == PERSON_PARTS["filter"]["color"]["parts"]
+    assert preset_defaults({"target": {"space": "volume"}}) == ROBUST
+    assert preset_defaults({"preset": "paper"}) == PAPER
+
+
+@pytest.mark.parametrize("broken", [{"preset": 3}, {"preset": "none"}, {"target": []}, {"network": "ring"}])
+def test_a_broken_scenario_is_left_to_the_model_to_judge(broken):
+    assert isinstance(preset_defaults(broken), dict)
+
+
+def test_presets_are_not_changed_by_what_is_merged(small):
+    before = repr((PAPER, ROBUST, PERSON_PARTS))
+
+    load_scenario(small, [("preset", "paper"), ("filter.n_particles", "7")])
+    load_scenario(small, [("filter.color.bins_per_channel", "7")])
+
+    assert repr((PAPER, ROBUST, PERSON_PARTS)) == before
