@@ -10,6 +10,7 @@ from jaxtyping import UInt8
 
 from network.messages import ConfirmMessage, EstimateMessage, PixelsMessage
 from nodes.estimator import SirEstimator
+from nodes.filtering.appearance import Appearance, pack_looks, unpack_looks
 from nodes.filtering.observation import ObservationModel
 from nodes.setup import TrackingSetup
 
@@ -31,8 +32,9 @@ class Central:
             setup: What the run tracks.
         """
         self.name = name
+        self._models, self._setup = dict(sorted(models.items())), setup
         self._cameras = set(models)
-        self._estimator = SirEstimator(name, "cpf", models.values(), setup)
+        self._estimator = SirEstimator(name, "cpf", setup)
         self._images: dict[int, dict[str, UInt8[np.ndarray, "H W 3"]]] = {}
         self._newest = dict.fromkeys(models, -1)
         self._frame = 0
@@ -42,16 +44,16 @@ class Central:
         if message.sender in self._cameras and 0 <= message.frame - self._frame <= MAX_AHEAD:
             self._newest[message.sender] = message.frame
             self._images.setdefault(message.frame, {})[message.sender] = message.image
-        return self._if_complete()
+        return self._while_complete()
 
     def on_lost(self, camera: str) -> Outgoing:
         """A camera is gone: the filter goes on with the others."""
         self._cameras.discard(camera)
-        return self._if_complete()
+        return self._while_complete()
 
     def on_deadline(self) -> Outgoing:
         """The frame's time is up: goes on with the pictures that have come."""
-        return self._step()
+        return (*self._step(), *self._while_complete())
 
     @property
     def cameras(self) -> frozenset[str]:
@@ -68,13 +70,34 @@ class Central:
         """Cameras whose picture of the frame may still come."""
         return tuple(sorted(name for name in self._cameras if self._newest[name] < self._frame))
 
-    def _if_complete(self) -> Outgoing:
-        return self._step() if self._cameras and not self.waiting_for else ()
+    def _while_complete(self) -> Outgoing:
+        """Steps through the frames of which every picture is there."""
+        messages: Outgoing = ()
+        while self._cameras and not self.waiting_for:
+            messages += self._step()
+        return messages
 
     def _step(self) -> Outgoing:
         frame = self._frame
         images = dict(sorted(self._images.pop(frame, {}).items()))
         self._frame = frame + 1
-        begun = frame > 0
-        estimate = self._estimator.step(frame, images) if begun else self._estimator.begin(images)
+        if frame == 0:
+            estimate = self._estimator.begin(self._first_appearances(images))
+        else:
+            models = {name: self._models[name] for name in images}
+            pictures = {name: (model, model.look(images[name])) for name, model in models.items()}
+            estimate = self._estimator.step(frame, pictures)
         return ConfirmMessage(self.name, frame), estimate
+
+    def _first_appearances(
+        self, images: Mapping[str, UInt8[np.ndarray, "H W 3"]]
+    ) -> dict[str, Appearance | None]:
+        """The target's looks at the start; a camera that cannot see it, or is late, is told by the others."""
+        self._models |= {name: self._models[name].with_first(image) for name, image in images.items()}
+        position, color = self._setup.start.moments.position().mean, self._setup.filter.color
+        own = dict.fromkeys(self._models) | {
+            name: self._models[name].first_appearance(self._models[name].look(image), position)
+            for name, image in images.items()
+        }
+        told = unpack_looks(np.mean([pack_looks(seen, color) for seen in own.values()], axis=0), color)
+        return {name: seen or told for name, seen in own.items()}

@@ -8,7 +8,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 
 from network.consensus import Consensus
 from network.messages import ConsensusMessage, EstimateMessage
@@ -19,7 +19,7 @@ from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.local import LocalResult, local_filter
 from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.particles import Particles, effective_sample_size, resample_if_degenerate
-from nodes.filtering.sighting import Sighting
+from nodes.filtering.sighting import Sighting, shrinkage_by
 from nodes.setup import TrackingSetup
 
 Outgoing = tuple[ConsensusMessage | EstimateMessage, ...]
@@ -30,7 +30,6 @@ class FrameInProgress:
     """What a camera keeps of a frame while its neighbours' messages come in."""
 
     index: int
-    image: UInt8[np.ndarray, "H W 3"]
     picture: Picture
     predicted: Particles
 
@@ -71,7 +70,7 @@ class SmartCamera:
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
         self._frame: FrameInProgress | None = None
-        self._single = SirEstimator(self.name, "single", [model], setup) if with_single else None
+        self._single = SirEstimator(self.name, "single", setup) if with_single else None
 
     def on_frame(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> Outgoing:
         """A picture has been taken: filters it and opens the frame's consensus.
@@ -89,7 +88,7 @@ class SmartCamera:
         local = self._filter_locally(picture, predicted)
         self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
-        self._frame = FrameInProgress(index, image, picture, predicted)
+        self._frame = FrameInProgress(index, picture, predicted)
         return self._with_result(self._consensus.begin(index, pack(local, self._setup.fusion)))
 
     def on_message(self, message: ConsensusMessage) -> Outgoing:
@@ -159,18 +158,27 @@ class SmartCamera:
         )
         # estimate
         estimate = moments(posterior.states, posterior.weights)
+        ess = effective_sample_size(posterior)
         prior = moments(frame.predicted.states, frame.predicted.weights)
-        self._sighting = self._sighting.after(prior.position(), estimate.position())
-        message = self._message(frame, estimate, effective_sample_size(posterior))
+        self._sighting = self._sighting.after(shrinkage_by(fused.gain, prior))
         # resample
         threshold = setup.filter.resampling.threshold
         self._particles = resample_if_degenerate(posterior, threshold, self._fusion_rng)
         # update the reference (Eq. 4)
-        if self._appearance is not None:
-            position = estimate.position().mean
-            self._appearance = self._model.updated(frame.picture, position, self._appearance)
-        single = self._single.step(frame.index, {self.name: frame.image}) if self._single else None
-        return (message, single) if single else (message,)
+        visible = self._update_appearance(frame.picture, estimate.position().mean)
+        message = self._message(frame, estimate, ess, visible=visible)
+        if self._single is None:
+            return (message,)
+        return message, self._single.step(frame.index, {self.name: (self._model, frame.picture)})
+
+    def _update_appearance(self, picture: Picture, position: Float[np.ndarray, " A"]) -> bool:
+        """Updates the reference by what the estimate's box shows; returns whether it shows the target."""
+        appearance = self._appearance
+        if appearance is None:
+            return False
+        sight = self._model.sight(picture, position, appearance)
+        self._appearance = self._model.updated(picture, position, sight, appearance)
+        return self._model.sees(sight, appearance)
 
     def _begin(self, image: UInt8[np.ndarray, "H W 3"]) -> Outgoing:
         """Frame 0: the target's looks, averaged over the cameras that see it at the start."""
@@ -178,22 +186,24 @@ class SmartCamera:
         picture = self._model.look(image)
         position = self._setup.start.moments.position().mean
         self._appearance = self._model.first_appearance(picture, position)
-        self._frame = FrameInProgress(0, image, picture, self._particles)
+        self._frame = FrameInProgress(0, picture, self._particles)
         looks = pack_looks(self._appearance, self._setup.filter.color)
         return self._with_result(self._consensus.begin(0, looks))
 
     def _finish_first(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
         """A camera that saw nothing takes the looks that the others saw."""
+        visible = self._appearance is not None
         if self._appearance is None:
             self._appearance = unpack_looks(self._consensus.value, self._setup.filter.color)
         n = float(self._setup.filter.n_particles)
-        message = self._message(frame, self._setup.start.moments, n)
+        message = self._message(frame, self._setup.start.moments, n, visible=visible)
         if self._single is None:
             return (message,)
-        return message, self._single.begin({self.name: frame.image}, {self.name: self._appearance})
+        return message, self._single.begin({self.name: self._appearance})
 
-    def _message(self, frame: FrameInProgress, estimate: Moments, ess: float) -> EstimateMessage:
-        position = estimate.position().mean
+    def _message(
+        self, frame: FrameInProgress, estimate: Moments, ess: float, *, visible: bool
+    ) -> EstimateMessage:
         return EstimateMessage(
             run=self._setup.run,
             node=self.name,
@@ -202,7 +212,7 @@ class SmartCamera:
             time_s=frame.index / self._setup.rate_hz,
             mean=estimate.mean,
             covariance=estimate.covariance,
-            visible=self._model.sees(frame.picture, position, self._appearance),
+            visible=visible,
             lost=self._sighting.lost,
             ess=ess,
             iterations=self._consensus.rounds_done,

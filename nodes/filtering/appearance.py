@@ -81,7 +81,8 @@ def squared_distances(
     """
     weights = np.array(options.part_weights) * reference.any(axis=(1, 2))
     # h = counts / pixels; Σ_b √(h q), mean over channels, weighted mean over parts
-    scale = np.sqrt(reference[reference > 0]) * weights[book.part] / book.n_channels
+    told_apart = reference[book.codes < len(book.part)]
+    scale = np.sqrt(told_apart) * weights[book.part] / book.n_channels
     inverse_root = 1 / np.sqrt(np.maximum(pixels, 1))
     coefficient = np.einsum("nk,k,nk->n", np.sqrt(counts), scale, inverse_root[:, book.part])
     seen = (pixels > 0) @ weights

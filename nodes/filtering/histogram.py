@@ -23,7 +23,8 @@ class SamplingOptions(Options):
     grid: tuple[PositiveInt, PositiveInt] | None = (15, 15)
     """Columns and rows of the grid of samples; null counts every pixel of the box."""
     kernel: Literal["uniform", "epanechnikov"] = "uniform"
-    """`epanechnikov` samples the middle of the box more densely than its border; needs a grid."""
+    """`epanechnikov` samples the middle of the box more densely than its border; without a grid, all pixels
+    count alike."""
     min_visible: float = Field(default=0.5, ge=0, le=1)
     """Part of a box that must lie inside the picture for the camera to say anything about it."""
 
@@ -80,7 +81,7 @@ def count(
     Returns:
         Counts of each code, and pixels (of one channel) in each part; pixels outside count nowhere.
     """
-    boxes = np.nan_to_num(boxes, nan=-1e6)
+    boxes = np.where(np.isnan(boxes), -1e6, boxes)
     if sampling.grid is None:
         return _count_every_pixel(bins, boxes, book)
     return _count_samples(bins, boxes, book, sampling.grid, sampling.kernel)

@@ -7,7 +7,7 @@ camera and one picture lives here; nothing about particles' weights does.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from network.options import Options
 from nodes.camera import Camera
@@ -48,8 +48,15 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sight:
-    """What one box shows: its distance to the reference and how much of it is in the picture."""
+    """What one box shows.
 
+    Attributes:
+        histograms: Normalised, of each part and channel.
+        squared_distance: d² to the reference.
+        visible: Part of the box inside the picture.
+    """
+
+    histograms: Float[np.ndarray, "P C B"]
     squared_distance: float
     visible: float
 
@@ -104,100 +111,91 @@ class ObservationModel:
         return self._box_distances(picture, boxes, appearance.histograms)
 
     def sight(self, picture: Picture, position: Float[np.ndarray, " A"], appearance: Appearance) -> Sight:
-        """The distance and the visible part at one position."""
-        distance, visible = self.distances(picture, position[None], appearance)
-        return Sight(float(distance[0]), float(visible[0]))
+        """What the target's box at a position shows."""
+        boxes = project_boxes(position[None], self.target, self.camera)
+        visible = visible_fraction(boxes, self.camera)
+        book = full_codebook(self.options.color)
+        counts, pixels = self._count(picture, boxes, visible, book)
+        distance = squared_distances(counts, pixels, appearance.histograms, book, self.options.color)
+        histograms = normalize_counts(counts[0], pixels[0], self.options.color)
+        return Sight(histograms, float(distance[0]), float(visible[0]))
 
-    def sees(
-        self, picture: Picture, position: Float[np.ndarray, " A"], appearance: Appearance | None
-    ) -> bool:
-        """Whether the picture shows the target at a position."""
-        if appearance is None:
-            return False
-        sight = self.sight(picture, position, appearance)
+    def sees(self, sight: Sight, appearance: Appearance) -> bool:
+        """Whether a box shows the target."""
         min_visible = self.options.sampling.min_visible
         return sight.visible >= min_visible and sight.squared_distance < appearance.miss_distance
-
-    def histograms(self, picture: Picture, position: Float[np.ndarray, " A"]) -> Float[np.ndarray, "P C B"]:
-        """Normalised histograms of the target's box at a position."""
-        boxes = project_boxes(position[None], self.target, self.camera)
-        return self._box_histograms(picture, boxes)
 
     def first_appearance(self, picture: Picture, position: Float[np.ndarray, " A"]) -> Appearance | None:
         """The reference at the target's known position, or None where its box is not well in the picture."""
         boxes = project_boxes(position[None], self.target, self.camera)
-        if visible_fraction(boxes, self.camera)[0] < GOOD_SIGHT:
+        visible = visible_fraction(boxes, self.camera)
+        if visible[0] < GOOD_SIGHT:
             return None
-        histograms = self._box_histograms(picture, boxes)
+        color = self.options.color
+        counts, pixels = self._count(picture, boxes, visible, full_codebook(color))
+        histograms = normalize_counts(counts[0], pixels[0], color)
         # What surrounds the target tells how near a look-alike comes.
         distance, visible = self._box_distances(picture, surrounding_boxes(boxes[0]), histograms)
         miss_distance, variance = background_constants(distance[visible > 0.7], self.options.likelihood)
         return Appearance(histograms, histograms, miss_distance, variance, own=True)
 
     def updated(
-        self, picture: Picture, position: Float[np.ndarray, " A"], appearance: Appearance
+        self, picture: Picture, position: Float[np.ndarray, " A"], sight: Sight, appearance: Appearance
     ) -> Appearance:
-        """The reference after the frame's estimate: Eq. 4, and a first look of one's own."""
-        if not appearance.own:
-            return self._first_look(picture, position, appearance)
-        if self.options.model_update.alpha == 0:
-            return appearance
-        sight = self.sight(picture, position, appearance)
-        return update_appearance(
-            appearance,
-            self.histograms(picture, position),
-            sight.squared_distance,
-            sight.visible,
-            self.options.model_update,
-        )
+        """The reference after the frame's estimate: Eq. 4, and a first look of one's own.
 
-    def _first_look(
-        self, picture: Picture, position: Float[np.ndarray, " A"], appearance: Appearance
-    ) -> Appearance:
-        """Its own reference in place of the neighbours', at the first good sight of the target."""
-        sight = self.sight(picture, position, appearance)
-        max_distance = self.options.model_update.max_distance * appearance.miss_distance
-        if sight.visible < GOOD_SIGHT or sight.squared_distance > max_distance:
+        Args:
+            picture: Of the frame.
+            position: The estimate's.
+            sight: What it shows there.
+            appearance: The reference before.
+        """
+        update = self.options.model_update
+        if appearance.own:
+            return update_appearance(
+                appearance, sight.histograms, sight.squared_distance, sight.visible, update
+            )
+        # Its own reference in place of the neighbours', at the first good sight of the target.
+        if (
+            sight.visible < GOOD_SIGHT
+            or sight.squared_distance > update.max_distance * appearance.miss_distance
+        ):
             return appearance
         return self.first_appearance(picture, position) or appearance
-
-    def _box_histograms(
-        self, picture: Picture, boxes: Float[np.ndarray, "1 4"]
-    ) -> Float[np.ndarray, "P C B"]:
-        color = self.options.color
-        counts, pixels = self._count(picture, boxes, full_codebook(color))
-        return normalize_counts(counts[0], pixels[0], color)
 
     def _box_distances(
         self, picture: Picture, boxes: Float[np.ndarray, "N 4"], reference: Float[np.ndarray, "P C B"]
     ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
+        visible = visible_fraction(boxes, self.camera)
         book = reference_codebook(reference, self.options.color)
-        counts, pixels = self._count(picture, boxes, book)
-        distance = squared_distances(counts, pixels, reference, book, self.options.color)
-        return distance, visible_fraction(boxes, self.camera)
+        counts, pixels = self._count(picture, boxes, visible, book)
+        return squared_distances(counts, pixels, reference, book, self.options.color), visible
 
     def _count(
-        self, picture: Picture, boxes: Float[np.ndarray, "N 4"], book: Codebook
-    ) -> tuple[np.ndarray, np.ndarray]:
+        self,
+        picture: Picture,
+        boxes: Float[np.ndarray, "N 4"],
+        visible: Float[np.ndarray, " N"],
+        book: Codebook,
+    ) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, "N P"]]:
         # Only the region that the boxes cover is quantised.
-        left, top, right, bottom = covered_region(boxes, self.camera)
+        left, top, right, bottom = covered_region(boxes[visible > 0], self.camera)
         bins = quantize(picture.image[top:bottom, left:right], self.options.color, picture.gain)
         return count(bins, boxes - np.array([left, top, left, top]), book, self.options.sampling)
 
 
 def covered_region(boxes: Float[np.ndarray, "N 4"], camera: Camera) -> tuple[int, int, int, int]:
-    """left, top, right, bottom of the part of the picture that the boxes cover; at least one pixel."""
-    size = np.array([camera.width_px, camera.height_px])
-    pictured: Bool[np.ndarray, " N"] = visible_fraction(boxes, camera) > 0
-    if not pictured.any():
+    """left, top, right, bottom of the part of the picture that boxes in it cover; at least one pixel."""
+    if not len(boxes):
         return 0, 0, 1, 1
-    low = np.clip(np.floor(boxes[pictured, :2].min(axis=0)), 0, size - 1).astype(int)
-    high = np.clip(np.ceil(boxes[pictured, 2:].max(axis=0)), low + 1, size).astype(int)
+    size = np.array([camera.width_px, camera.height_px])
+    low = np.clip(np.floor(boxes[:, :2].min(axis=0)), 0, size - 1).astype(int)
+    high = np.clip(np.ceil(boxes[:, 2:].max(axis=0)), low + 1, size).astype(int)
     return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
 
 def surrounding_boxes(box: Float[np.ndarray, " 4"]) -> Float[np.ndarray, "N 4"]:
-    """Boxes of the same size on three rings around a box, none of which overlaps it."""
+    """Boxes of the same size on three rings around a box; those straight above and below overlap it."""
     center, size = (box[:2] + box[2:]) / 2, box[2:] - box[:2]
     angles = np.arange(12) * np.pi / 6
     # rings of 1.5, 2.5 and 4 box widths, flattened to the part of the picture where a target could be

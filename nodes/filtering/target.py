@@ -75,15 +75,12 @@ def project_boxes(
     pixels, depth = camera.project(np.concatenate([foot, head]))
     ends = pixels.reshape(2, -1, 2) + 0.5
     middle = ends.mean(axis=0)
-    # A slanted view shortens the body but not its depth: a box is at least as high as the head is wide.
-    half_width = 0.5 * camera.K[0, 0] * target.width / np.maximum(depth.reshape(2, -1).mean(axis=0), 1e-6)
-    half_height = np.maximum(0.5 * np.abs(ends[0, :, 1] - ends[1, :, 1]), half_width * MIN_ASPECT)
-    low, high = (
-        middle - np.stack([half_width, half_height], 1),
-        middle + np.stack([half_width, half_height], 1),
-    )
-    boxes = np.concatenate([low, high], axis=1)
-    boxes[~(half_height > 1.0)] = np.nan
+    # A slanted or rolled view shortens the body but not its thickness: a box is at least as wide as it,
+    # and nearly as high.
+    trunk = 0.5 * camera.K[0, 0] * target.width / np.maximum(depth.reshape(2, -1).mean(axis=0), 1e-6)
+    half = np.maximum(0.5 * np.abs(ends[0] - ends[1]), trunk[:, None] * np.array([1.0, MIN_ASPECT]))
+    boxes = np.concatenate([middle - half, middle + half], axis=1)
+    boxes[~(half[:, 1] > 1.0)] = np.nan
     return boxes
 
 
@@ -93,4 +90,4 @@ def visible_fraction(boxes: Float[np.ndarray, "N 4"], camera: Camera) -> Float[n
     low, high = boxes[:, :2], boxes[:, 2:]
     inside = np.clip(np.minimum(high, size) - np.maximum(low, 0.0), 0.0, None)
     fraction = inside.prod(axis=1) / (high - low).prod(axis=1)
-    return np.nan_to_num(fraction, nan=0.0)
+    return np.where(np.isnan(fraction), 0.0, fraction)
