@@ -97,14 +97,16 @@ def _count_samples(
     n_parts, n_codes = len(book.part_heights), len(book.part)
     height, width = bins.shape[1] + 2, bins.shape[2] + 2
     columns, rows = sample_positions(grid[0], kernel, 1.0), sample_positions(grid[1], kernel, 0.5)
-    row_part = np.clip(np.searchsorted(book.part_edges, rows, side="right") - 1, 0, n_parts - 1)
+    row_part = np.clip(np.searchsorted(book.part_edges, rows, side="right") - 1, 0, n_parts - 1).astype(
+        np.int32
+    )
     # Samples outside fall on a border one pixel wide, which has a code of its own: n_codes + 1.
-    left, top, right, bottom = boxes.T[:, :, None]
-    # 32-bit indices: the arrays of all samples are what this function's time goes to.
-    x = np.clip(np.floor(left + columns * (right - left)), -1, width - 2).astype(np.int32) + 1
-    y = np.clip(np.floor(top + rows * (bottom - top)), -1, height - 2).astype(np.int32) + 1
-    index = ((row_part.astype(np.int32) * height + y) * width)[:, :, None] + x[:, None, :]
-    offset = (n_codes + 2) * np.arange(len(boxes), dtype=np.intp)[:, None, None]
+    # Particles are the last axis, the longest, which is what this function's time depends on.
+    left, top, right, bottom = boxes.T
+    x = np.clip(np.floor(left + columns[:, None] * (right - left)), -1, width - 2).astype(np.int32) + 1
+    y = np.clip(np.floor(top + rows[:, None] * (bottom - top)), -1, height - 2).astype(np.int32) + 1
+    index = ((row_part[:, None] * height + y) * width)[:, None] + x
+    offset = (n_codes + 2) * np.arange(len(boxes))
     total = np.zeros((len(boxes), n_codes + 2), dtype=np.intp)
     for channel, channel_bins in enumerate(bins):
         coded = np.full((n_parts, height, width), n_codes + 1, dtype=np.uint16)
@@ -113,10 +115,10 @@ def _count_samples(
         sampled = coded.take(index, mode="clip") + offset
         total += np.bincount(sampled.ravel(), minlength=total.size).reshape(total.shape)
     # Samples of a part that lie inside, from the separable grid
-    inside_x = ((x > 0) & (x < width - 1)).sum(axis=1)
+    inside_x = ((x > 0) & (x < width - 1)).sum(axis=0)
     inside_y = (y > 0) & (y < height - 1)
     of_part = row_part == np.arange(n_parts)[:, None]
-    pixels = inside_x[:, None] * (inside_y[:, None, :] & of_part).sum(axis=2)
+    pixels = inside_x[:, None] * (of_part[:, :, None] & inside_y).sum(axis=1).T
     return total[:, :n_codes], pixels
 
 

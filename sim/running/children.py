@@ -16,8 +16,6 @@ from network.sessions import RUNTIME_ENVIRONMENT
 LEAVE_S = 8.0
 """How long the host has for ending everybody before it is ended itself."""
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-KEEP_MEMORY = dict.fromkeys(("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"), str(64 << 20))
-"""glibc gives arrays over 128 kB back to the system and takes them anew, page by page, in every frame."""
 
 
 class RunFailed(Exception):  # noqa: N818 - what it says is that the run failed
@@ -54,7 +52,7 @@ class Children:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=log,
-                env=os.environ | RUNTIME_ENVIRONMENT | ONE_THREAD | KEEP_MEMORY,
+                env=os.environ | RUNTIME_ENVIRONMENT | ONE_THREAD,
                 # Ctrl-C in the terminal is the launcher's business.
                 start_new_session=True,
             )

@@ -36,7 +36,7 @@ ROBUST: Mapping[str, Any] = {
 PERSON_PARTS: Mapping[str, Any] = {
     "filter": {
         "color": {"parts": [0.14, 0.38, 0.48], "part_weights": [0.2, 0.45, 0.35]},
-        "sampling": {"grid": [12, 24]},
+        "sampling": {"grid": [10, 20]},
     }
 }
 """Head, torso and legs: what the robust preset tells apart in a target that stands on a plane, and the

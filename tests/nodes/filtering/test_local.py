@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from nodes.filtering.gaussian import Moments
+from nodes.filtering.gaussian import Information, Moments, no_information
 from nodes.filtering.local import local_filter
 from nodes.filtering.particles import Particles
-from nodes.filtering.sighting import PATIENCE, Sighting
+from nodes.filtering.sighting import PATIENCE, Sighting, shrinkage, shrinkage_by
 
 
 def test_equations_9_to_14_written_out():
@@ -38,15 +38,32 @@ def test_frames_that_tell_nothing_are_counted_and_lose_the_target(shrunk):
     after = Moments(np.zeros(2), shrunk * before.covariance)
     for frame in range(PATIENCE):
         assert not sighting.lost
-        sighting = sighting.after(before, after)
+        sighting = sighting.after(shrinkage(before, after))
         assert sighting.unseen == frame + 1
     assert sighting.lost
     # half the variance along one axis is 25% in the mean: something was seen
     seen = Moments(np.zeros(2), np.diag([0.02, 0.01]))
-    assert not sighting.after(before, seen).lost
+    assert shrinkage(before, seen) == pytest.approx(0.75)
+    assert not sighting.after(shrinkage(before, seen)).lost
 
 
 @pytest.mark.parametrize("covariance", [np.zeros((2, 2)), np.ones((2, 2)), 1e9 * np.ones((2, 2))])
 def test_a_collapsed_cloud_learns_nothing_and_is_no_exception(covariance):
     collapsed = Moments(np.zeros(2), covariance)
-    assert Sighting().after(collapsed, collapsed).unseen == 1
+    assert Sighting().after(shrinkage(collapsed, collapsed)).unseen == 1
+    state = Moments(np.zeros(4), np.kron(np.eye(2), covariance))
+    assert shrinkage_by(no_information(2), state) == pytest.approx(1)
+
+
+def test_a_factor_shrinks_the_covariance_as_the_kalman_update_does():
+    rng = np.random.default_rng(3)
+    A, B = rng.normal(size=(2, 4, 4))
+    predicted = Moments(np.zeros(4), A @ A.T + np.eye(4))
+    gain = Information((B @ B.T)[:2, :2], np.zeros(2))
+    r = predicted.covariance[:2, :2]
+    p = np.linalg.inv(np.linalg.inv(r) + gain.matrix)
+    assert shrinkage_by(gain, predicted) == pytest.approx(
+        shrinkage(Moments(np.zeros(2), r), Moments(np.zeros(2), p))
+    )
+    taking_away = Information(-0.5 * np.linalg.inv(r), np.zeros(2))
+    assert shrinkage_by(taking_away, predicted) == pytest.approx(1)
