@@ -37,6 +37,7 @@ class Appearance:
     Attributes:
         histograms: Each of the P x C adds up to 1, or to 0 where the part was not seen.
         first: The histograms that it started from.
+        distinctness: How much each bin tells the target from what surrounds it, 0 to 1.
         miss_distance: d₀², the distance at which the target counts as not seen.
         variance: σ² of the likelihood.
         own: Whether the camera saw it with its own eyes; else its neighbours described it.
@@ -44,17 +45,18 @@ class Appearance:
 
     histograms: Float[np.ndarray, "P C B"]
     first: Float[np.ndarray, "P C B"]
+    distinctness: Float[np.ndarray, "P C B"]
     miss_distance: float
     variance: float
     own: bool
 
 
 def normalize_counts(
-    counts: Int[np.ndarray, " K"], pixels: Int[np.ndarray, " P"], options: ColorOptions
-) -> Float[np.ndarray, "P C B"]:
+    counts: Int[np.ndarray, "N K"], pixels: Int[np.ndarray, "N P"], options: ColorOptions
+) -> Float[np.ndarray, "N P C B"]:
     """Takes hist / sum(hist) of each part and channel (Eq. 11), from counts of every bin."""
-    shape = (len(options.parts), options.n_channels, options.n_bins)
-    return counts.reshape(shape) / np.maximum(pixels, 1)[:, None, None]
+    shape = (len(counts), len(options.parts), options.n_channels, options.n_bins)
+    return counts.reshape(shape) / np.maximum(pixels, 1)[:, :, None, None]
 
 
 def full_codebook(options: ColorOptions) -> Codebook:
@@ -62,32 +64,49 @@ def full_codebook(options: ColorOptions) -> Codebook:
     return codebook(np.ones((len(options.parts), options.n_channels, options.n_bins), bool), options.parts)
 
 
-def reference_codebook(histograms: Float[np.ndarray, "P C B"], options: ColorOptions) -> Codebook:
-    """A codebook of the bins that the reference holds."""
-    return codebook(histograms > 0, options.parts)
+def reference_codebook(appearance: Appearance, options: ColorOptions) -> Codebook:
+    """A codebook of the bins of the reference that tell the target from its surroundings."""
+    return codebook(appearance.histograms * appearance.distinctness > 0, options.parts)
+
+
+def distinctness_of(
+    target: Float[np.ndarray, "P C B"], surroundings: Float[np.ndarray, "P C B"]
+) -> Float[np.ndarray, "P C B"]:
+    """ω = max(0, 1 - o/q): the share of a bin in the target's box that its surroundings do not explain.
+
+    Comaniciu, Ramesh & Meer (2003), section 6.1, weight bins by the background, and Ning et al. (2012) the
+    reference's only. A reference that is taken a little beside the target holds floor and wall on one side;
+    weighted, they count for nothing, and the best box is the one that holds most of the target.
+
+    Args:
+        target: q, what the target's box shows.
+        surroundings: o, the mean of what boxes around it show.
+    """
+    return np.where(target > 0, np.maximum(1 - surroundings / np.maximum(target, 1e-12), 0.0), 0.0)
 
 
 def squared_distances(
     counts: Int[np.ndarray, "N K"],
     pixels: Int[np.ndarray, "N P"],
-    reference: Float[np.ndarray, "P C B"],
+    appearance: Appearance,
     book: Codebook,
     options: ColorOptions,
 ) -> Float[np.ndarray, " N"]:
-    """The Bhattacharyya distance d² of each box to the reference.
+    """The weighted Bhattacharyya distance of each box to the reference, d² = 1 - Σ ω √(h q) / Σ ω q.
 
-    Parts of which nothing is in the picture, or in the reference, do not count; a box with none at all has
-    distance 1.
+    With ω = 1 it is the plain one, from 0 to 1. Otherwise a box that shows more of the target than the
+    reference's box did is nearer than the reference itself, below 0. Parts of which nothing is in the
+    picture, or in the reference, do not count; a box with none at all has distance 1.
     """
-    weights = np.array(options.part_weights) * reference.any(axis=(1, 2))
-    # h = counts / pixels; Σ_b √(h q), mean over channels, weighted mean over parts
-    told_apart = reference[book.codes < len(book.part)]
-    scale = np.sqrt(told_apart) * weights[book.part] / book.n_channels
+    q, omega = appearance.histograms, appearance.distinctness
+    weights = np.array(options.part_weights) / book.n_channels
+    # h = counts / pixels; Σ_p w_p Σ_b ω √(h q)
+    scale = (omega * np.sqrt(q))[book.codes < len(book.part)] * weights[book.part]
     inverse_root = 1 / np.sqrt(np.maximum(pixels, 1))
     coefficient = np.einsum("nk,k,nk->n", np.sqrt(counts), scale, inverse_root[:, book.part])
-    seen = (pixels > 0) @ weights
-    similarity = np.divide(coefficient, seen, out=np.zeros_like(seen), where=seen > 0)
-    return np.maximum(1 - similarity, 0.0)  # a perfect match is below zero by rounding
+    # Σ_p w_p Σ_b ω q over the parts that are in the picture
+    perfect = (pixels > 0) @ (weights * (omega * q).sum(axis=(1, 2)))
+    return 1 - np.divide(coefficient, perfect, out=np.zeros_like(perfect), where=perfect > 0)
 
 
 def update_appearance(
@@ -115,14 +134,15 @@ def pack_looks(appearance: Appearance | None, options: ColorOptions) -> Float[np
     """The vector whose average over the network tells a camera that sees nothing what the target looks like.
 
     Returns:
-        Histograms, d₀², σ² and a 1; all zeros from a camera that has not seen the target.
+        Histograms q, what is distinct in them ω q, d₀², σ² and a 1; all zeros from a camera that has not seen
+        the target.
     """
     n = len(options.parts) * options.n_channels * options.n_bins
     if appearance is None:
-        return np.zeros(n + 3)
-    return np.concatenate(
-        [appearance.histograms.ravel(), [appearance.miss_distance, appearance.variance, 1.0]]
-    )
+        return np.zeros(2 * n + 3)
+    distinct = appearance.histograms * appearance.distinctness
+    constants = [appearance.miss_distance, appearance.variance, 1.0]
+    return np.concatenate([appearance.histograms.ravel(), distinct.ravel(), constants])
 
 
 def unpack_looks(average: Float[np.ndarray, " K"], options: ColorOptions) -> Appearance | None:
@@ -132,6 +152,7 @@ def unpack_looks(average: Float[np.ndarray, " K"], options: ColorOptions) -> App
         return None
     # Σ seen / Σ 1: the ratio is a weighted mean even where consensus is not complete
     mean = average / share
-    shape = (len(options.parts), options.n_channels, options.n_bins)
-    histograms = mean[:-3].reshape(shape)
-    return Appearance(histograms, histograms, float(mean[-3]), float(mean[-2]), own=False)
+    shape = (2, len(options.parts), options.n_channels, options.n_bins)
+    histograms, distinct = mean[:-3].reshape(shape)
+    distinctness = np.divide(distinct, histograms, out=np.zeros_like(distinct), where=histograms > 0)
+    return Appearance(histograms, histograms, distinctness, float(mean[-3]), float(mean[-2]), own=False)

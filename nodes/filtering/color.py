@@ -29,6 +29,8 @@ class ColorOptions(Options):
     histogram."""
     part_weights: tuple[float, ...] = (1.0,)
     """How much each part counts in the distance; adds up to 1."""
+    background_weighting: bool = False
+    """Whether colours that surround the target at the start count less, or not at all."""
     gain_correction: bool = False
     """Whether each channel's gain is brought back to that of the camera's first picture."""
 

@@ -14,6 +14,7 @@ from nodes.camera import Camera
 from nodes.filtering.appearance import (
     Appearance,
     ModelUpdateOptions,
+    distinctness_of,
     full_codebook,
     normalize_counts,
     reference_codebook,
@@ -108,7 +109,7 @@ class ObservationModel:
     ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
         """d² to the reference and visible part of the box at each position."""
         boxes = project_boxes(positions, self.target, self.camera)
-        return self._box_distances(picture, boxes, appearance.histograms)
+        return self._box_distances(picture, boxes, appearance)
 
     def sight(self, picture: Picture, position: Float[np.ndarray, " A"], appearance: Appearance) -> Sight:
         """What the target's box at a position shows."""
@@ -116,8 +117,8 @@ class ObservationModel:
         visible = visible_fraction(boxes, self.camera)
         book = full_codebook(self.options.color)
         counts, pixels = self._count(picture, boxes, visible, book)
-        distance = squared_distances(counts, pixels, appearance.histograms, book, self.options.color)
-        histograms = normalize_counts(counts[0], pixels[0], self.options.color)
+        distance = squared_distances(counts, pixels, appearance, book, self.options.color)
+        histograms = normalize_counts(counts, pixels, self.options.color)[0]
         return Sight(histograms, float(distance[0]), float(visible[0]))
 
     def sees(self, sight: Sight, appearance: Appearance) -> bool:
@@ -128,16 +129,19 @@ class ObservationModel:
     def first_appearance(self, picture: Picture, position: Float[np.ndarray, " A"]) -> Appearance | None:
         """The reference at the target's known position, or None where its box is not well in the picture."""
         boxes = project_boxes(position[None], self.target, self.camera)
-        visible = visible_fraction(boxes, self.camera)
-        if visible[0] < GOOD_SIGHT:
+        if visible_fraction(boxes, self.camera)[0] < GOOD_SIGHT:
             return None
-        color = self.options.color
-        counts, pixels = self._count(picture, boxes, visible, full_codebook(color))
-        histograms = normalize_counts(counts[0], pixels[0], color)
-        # What surrounds the target tells how near a look-alike comes.
-        distance, visible = self._box_distances(picture, surrounding_boxes(boxes[0]), histograms)
-        miss_distance, variance = background_constants(distance[visible > 0.7], self.options.likelihood)
-        return Appearance(histograms, histograms, miss_distance, variance, own=True)
+        histograms = self._histograms(picture, boxes)[0]
+        appearance = Appearance(histograms, histograms, np.ones_like(histograms), 1.0, 1.0, own=True)
+        # What surrounds the target tells which colours are its own, and how near a look-alike comes.
+        around = surrounding_boxes(boxes[0])
+        around = around[visible_fraction(around, self.camera) > 0.7]
+        if len(around) and self.options.color.background_weighting:
+            background = self._histograms(picture, around).mean(axis=0)
+            appearance = replace(appearance, distinctness=distinctness_of(histograms, background))
+        distance, _ = self._box_distances(picture, around, appearance)
+        miss_distance, variance = background_constants(distance, self.options.likelihood)
+        return replace(appearance, miss_distance=miss_distance, variance=variance)
 
     def updated(
         self, picture: Picture, position: Float[np.ndarray, " A"], sight: Sight, appearance: Appearance
@@ -164,12 +168,17 @@ class ObservationModel:
         return self.first_appearance(picture, position) or appearance
 
     def _box_distances(
-        self, picture: Picture, boxes: Float[np.ndarray, "N 4"], reference: Float[np.ndarray, "P C B"]
+        self, picture: Picture, boxes: Float[np.ndarray, "N 4"], appearance: Appearance
     ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
         visible = visible_fraction(boxes, self.camera)
-        book = reference_codebook(reference, self.options.color)
+        book = reference_codebook(appearance, self.options.color)
         counts, pixels = self._count(picture, boxes, visible, book)
-        return squared_distances(counts, pixels, reference, book, self.options.color), visible
+        return squared_distances(counts, pixels, appearance, book, self.options.color), visible
+
+    def _histograms(self, picture: Picture, boxes: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N P C B"]:
+        color, visible = self.options.color, visible_fraction(boxes, self.camera)
+        counts, pixels = self._count(picture, boxes, visible, full_codebook(color))
+        return normalize_counts(counts, pixels, color)
 
     def _count(
         self,

@@ -6,6 +6,8 @@ A preset fills what the scenario file leaves unsaid; what the file says wins.
 from collections.abc import Mapping
 from typing import Any, Literal
 
+from nodes.filtering.target import TargetOptions
+
 PresetName = Literal["paper", "robust"]
 
 PAPER: Mapping[str, Any] = {
@@ -24,7 +26,12 @@ ROBUST: Mapping[str, Any] = {
     "network": {"consensus": {"algorithm": "metropolis"}, "iterations": 12},
     "filter": {
         "n_particles": 500,
-        "color": {"space": "joint_rgb", "bins_per_channel": 6, "gain_correction": True},
+        "color": {
+            "space": "joint_rgb",
+            "bins_per_channel": 6,
+            "gain_correction": True,
+            "background_weighting": True,
+        },
         "sampling": {"grid": [15, 15], "kernel": "epanechnikov"},
         "likelihood": {"calibration": "background"},
         "model_update": {"alpha": 0.1},
@@ -33,6 +40,8 @@ ROBUST: Mapping[str, Any] = {
 }
 """Joint colours without the camera's gain, a likelihood set from the background, net information."""
 
+SMALLEST_PERSON = 0.8
+"""Height in m from which a target on a plane is taken for a person."""
 PERSON_PARTS: Mapping[str, Any] = {
     "filter": {
         "color": {"parts": [0.14, 0.38, 0.48], "part_weights": [0.2, 0.45, 0.35]},
@@ -51,9 +60,7 @@ def preset_defaults(data: Mapping[str, Any]) -> Mapping[str, Any]:
     """
     name = data.get("preset", "robust")
     defaults = {"paper": PAPER, "robust": ROBUST}.get(name if isinstance(name, str) else "", {})
-    target = data.get("target")
-    on_plane = not (isinstance(target, Mapping) and target.get("space") == "volume")
-    if name == "robust" and on_plane:
+    if name == "robust" and _is_person(data.get("target")):
         defaults = _merged(defaults, PERSON_PARTS)
     network = data.get("network")
     consensus = network.get("consensus") if isinstance(network, Mapping) else None
@@ -61,6 +68,13 @@ def preset_defaults(data: Mapping[str, Any]) -> Mapping[str, Any]:
         # Another algorithm has other options: the file's own choice stands by itself.
         defaults = {**defaults, "network": {**defaults.get("network", {}), "consensus": {}}}
     return defaults
+
+
+def _is_person(target: Any) -> bool:
+    """Whether a target stands on a plane and is tall enough to have head, torso and legs."""
+    told = target if isinstance(target, Mapping) else {}
+    height = told.get("height", TargetOptions().height)
+    return told.get("space") != "volume" and isinstance(height, int | float) and height >= SMALLEST_PERSON
 
 
 def _merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from nodes.filtering.appearance import (
     Appearance,
     ModelUpdateOptions,
+    distinctness_of,
     full_codebook,
     normalize_counts,
     pack_looks,
@@ -20,6 +21,7 @@ from nodes.filtering.appearance import (
     update_appearance,
 )
 from nodes.filtering.color import ColorOptions
+from nodes.filtering.histogram import codebook
 
 JOINT = ColorOptions(space="joint_rgb", bins_per_channel=2)
 RGB = ColorOptions(bins_per_channel=4)
@@ -35,14 +37,17 @@ def random_counts(rng, options, n_boxes, n_pixels=50):
 
 
 def appearance_of(histograms, **changes):
-    return replace(Appearance(histograms, histograms, 0.2, 0.02, own=True), **changes)
+    appearance = Appearance(histograms, histograms, np.ones_like(histograms), 0.2, 0.02, own=True)
+    return replace(appearance, **changes)
 
 
-def distances(counts, reference, options, n_pixels=50):
+def distances(counts, reference, options, n_pixels=50, distinctness=1.0):
     """d² by way of the bins that the reference holds only."""
-    book = reference_codebook(reference, options)
+    appearance = appearance_of(reference, distinctness=distinctness * np.ones_like(reference))
+    book = reference_codebook(appearance, options)
     pixels = np.full((len(counts), len(options.parts)), n_pixels)
-    return squared_distances(counts[:, reference > 0], pixels, reference, book, options)
+    used = reference * appearance.distinctness > 0
+    return squared_distances(counts[:, used], pixels, appearance, book, options)
 
 
 @given(seeds)
@@ -77,9 +82,37 @@ def test_the_same_histogram_has_no_distance_and_another_one_has_one():
 
 
 @given(seeds)
-def test_a_distance_is_never_negative(seed):
+def test_a_plain_distance_is_never_negative(seed):
     counts = random_counts(np.random.default_rng(seed), PARTS, 3)
-    assert min(distances(counts, counts[0] / 50, PARTS)) >= 0
+    assert min(distances(counts, counts[0] / 50, PARTS)) >= -1e-12
+
+
+@given(seeds)
+def test_weights_multiply_both_sums(seed):
+    rng = np.random.default_rng(seed)
+    counts = random_counts(rng, PARTS, 4)
+    reference = random_counts(rng, PARTS, 1)[0] / 50
+    omega = rng.uniform(0.1, 1, reference.shape)
+    by_part = (omega * np.sqrt(counts / 50 * reference)).sum(axis=-1).mean(axis=-1)
+    perfect = (omega * reference).sum(axis=-1).mean(axis=-1)
+    expected = 1 - by_part @ PARTS.part_weights / (perfect @ PARTS.part_weights)
+    np.testing.assert_allclose(distances(counts, reference, PARTS, distinctness=omega), expected, atol=1e-12)
+
+
+def test_colours_of_the_surroundings_are_not_the_targets():
+    target, around = np.array([[[0.5, 0.3, 0.2, 0.0]]]), np.array([[[0.0, 0.15, 0.6, 0.25]]])
+    np.testing.assert_allclose(distinctness_of(target, around), [[[1, 0.5, 0, 0]]])
+
+
+def test_more_of_the_target_than_in_the_reference_is_nearer_than_the_reference():
+    reference = np.array([[[0.6, 0.4, 0, 0]]])  # four tenths of its box show the floor
+    omega = np.array([[[1.0, 0, 1, 1]]])
+    boxes = np.array([[[[60, 40, 0, 0]]], [[[90, 10, 0, 0]]], [[[30, 70, 0, 0]]]])
+    counts, book = boxes[:, reference * omega > 0], codebook(reference * omega > 0, (1.0,))
+    found = squared_distances(
+        counts, np.full((3, 1), 100), appearance_of(reference, distinctness=omega), book, JOINT
+    )
+    np.testing.assert_allclose(found, 1 - np.sqrt([1, 1.5, 0.5]), atol=1e-12)
 
 
 def test_parts_outside_the_picture_do_not_count():
@@ -89,9 +122,11 @@ def test_parts_outside_the_picture_do_not_count():
     reference = np.maximum(reference, 1e-9)  # every bin is told apart
     codes = counts.reshape(1, -1)
     torso_only = codes * (book.part == 1)
-    found = squared_distances(torso_only, np.array([[0, 50]]), reference, book, PARTS)
-    assert found[0] == pytest.approx(1 - np.sqrt(counts[0, 1] / 50 * reference[1]).sum(axis=-1).mean())
-    nothing = squared_distances(0 * codes, np.array([[0, 0]]), reference, book, PARTS)
+    appearance = appearance_of(reference)
+    found = squared_distances(torso_only, np.array([[0, 50]]), appearance, book, PARTS)
+    similarity = np.sqrt(counts[0, 1] / 50 * reference[1]).sum(axis=-1) / reference[1].sum(axis=-1)
+    assert found[0] == pytest.approx(1 - similarity.mean(), abs=1e-6)
+    nothing = squared_distances(0 * codes, np.array([[0, 0]]), appearance, book, PARTS)
     assert nothing[0] == 1
 
 
@@ -103,10 +138,10 @@ def test_parts_that_the_reference_has_not_seen_do_not_count():
 
 
 def test_normalised_histograms_add_up_to_one_or_were_not_seen():
-    counts = random_counts(np.random.default_rng(2), PARTS, 1)[0]
-    counts[1] = 0
-    histograms = normalize_counts(counts.ravel(), np.array([50, 0]), PARTS)
-    np.testing.assert_allclose(histograms.sum(axis=-1), [[1, 1, 1], [0, 0, 0]])
+    counts = random_counts(np.random.default_rng(2), PARTS, 1)
+    counts[0, 1] = 0
+    histograms = normalize_counts(counts.reshape(1, -1), np.array([[50, 0]]), PARTS)
+    np.testing.assert_allclose(histograms.sum(axis=-1), [[[1, 1, 1], [0, 0, 0]]])
 
 
 def test_the_update_is_equation_4():
@@ -146,12 +181,19 @@ def test_the_gate_is_closed_where_the_target_is_not_seen_well(options, distance,
 def test_a_blind_camera_is_told_the_mean_of_those_that_saw(seed, n_seeing, n_blind):
     rng = np.random.default_rng(seed)
     seen = [
-        appearance_of(random_counts(rng, PARTS, 1)[0] / 50, miss_distance=rng.random(), variance=rng.random())
+        appearance_of(
+            random_counts(rng, PARTS, 1)[0] / 50,
+            distinctness=rng.uniform(0, 1, (2, 3, 4)),
+            miss_distance=rng.random(),
+            variance=rng.random(),
+        )
         for _ in range(n_seeing)
     ]
     packed = [pack_looks(each, PARTS) for each in (*seen, *[None] * n_blind)]
     told = unpack_looks(np.mean(packed, axis=0), PARTS)
     np.testing.assert_allclose(told.histograms, np.mean([each.histograms for each in seen], axis=0))
+    distinct = np.mean([each.histograms * each.distinctness for each in seen], axis=0)
+    np.testing.assert_allclose(told.histograms * told.distinctness, distinct)
     assert told.miss_distance == pytest.approx(np.mean([each.miss_distance for each in seen]))
     assert told.variance == pytest.approx(np.mean([each.variance for each in seen]))
     assert not told.own

@@ -1,5 +1,7 @@
 """One camera and pictures painted by hand: a rectangle of the target's colours on another background."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -103,7 +105,7 @@ def test_a_uniform_scene_has_a_likelihood_too():
 def test_a_camera_takes_its_own_reference_at_its_first_good_sight():
     model, appearance = ready(OPTIONS["joint"])
     told = model.first_appearance(model.look(paint(THERE)), THERE)
-    told = type(told)(told.histograms, told.first, told.miss_distance, told.variance, own=False)
+    told = replace(told, own=False)
     hidden, seen = model.look(paint(None)), model.look(paint(HERE))
     assert updated(model, hidden, HERE, told) is told
     taken = updated(model, seen, HERE, told)
@@ -146,3 +148,16 @@ def test_surrounding_boxes_have_the_size_of_the_target_and_keep_off_its_middle()
     np.testing.assert_allclose(around[:, 2:] - around[:, :2], np.tile([20, 70], (len(around), 1)))
     off = (around[:, :2] + around[:, 2:]) / 2 - [80, 75]
     assert np.abs(off / 20 / [1, 0.5]).max(axis=1).min() > 1
+
+
+def test_a_reference_taken_beside_the_target_finds_its_middle_by_its_own_colours():
+    beside, shifts = HERE + np.array([0.12, 0.0]), np.linspace(-0.3, 0.3, 61)
+    places = HERE + np.stack([shifts, np.zeros(61)], axis=1)
+    best = {}
+    for weighted in (False, True):
+        color = ColorOptions(space="joint_rgb", bins_per_channel=6, background_weighting=weighted)
+        model, _ = ready(ObservationOptions(color=color))
+        picture = model.look(paint(HERE))
+        distance, _ = model.distances(picture, places, model.first_appearance(picture, beside))
+        best[weighted] = abs(shifts[distance <= distance.min() + 1e-3].mean())
+    assert best[True] < 0.5 * best[False]
