@@ -138,8 +138,6 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
     confirmed, done = -1, -1
     for index in range(shell.frames):
         if not shell.await_frame(index):
-            if shell.stopped:
-                break
             continue
         image = source.read(index) if index else first
         deadline = shell.deadline(index)
@@ -157,11 +155,11 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         _send(outgoing, shell)
         _rounds(node, deadline, shell)
         shell.telemetry.consensus_round_s.append((time.perf_counter() - began) / max(node.rounds_done, 1))
-        done = index
+        done = done if shell.stopped else index
         if index == 0:
             shell.report("running", index, node.counters)
     source.close()
-    shell.report("done" if done == shell.frames - 1 else "failed", done, node.counters)
+    shell.report("failed" if shell.stopped else "done", done, node.counters)
     shell.wait_for_stop()
 
 
@@ -180,6 +178,8 @@ def _rounds(node: SmartCamera, deadline: float, shell: Shell) -> None:
             _send(node.on_deadline(), shell)
         elif left <= 0:
             _send(node.on_lost(neighbor), shell)
+            # Those that waited for it as well have a budget of their own.
+            deadline = time.monotonic() + shell.pace.deadline_s
 
 
 def _await_confirmation(sink: str, frame: int, confirmed: int, shell: Shell) -> int:

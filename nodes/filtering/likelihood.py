@@ -28,9 +28,9 @@ class LikelihoodOptions(Options):
     """σ of the likelihood, in units of d (fixed)."""
     miss_distance: float = Field(default=0.12, gt=0)
     """d₀²: the squared distance at which the target counts as not seen (fixed)."""
-    background_fraction: float = Field(default=0.6, gt=0)
+    background_fraction: float = Field(default=0.5, gt=0)
     """d₀² as a fraction of the median d² of the target's surroundings (background)."""
-    background_ratio: float = Field(default=16.0, gt=0)
+    background_ratio: float = Field(default=36.0, gt=0)
     """d₀²/σ² (background)."""
 
 
@@ -71,6 +71,6 @@ def background_constants(
     fixed = options.calibration == "fixed" or len(surroundings) < 4
     if fixed or np.median(surroundings) < INDISTINCT:
         return options.miss_distance, options.sigma**2
-    # d₀² = 0.6 median d², σ² = d₀² / 16
+    # d₀² = 0.5 median d², σ² = d₀² / 36
     miss_distance = options.background_fraction * float(np.median(surroundings))
     return miss_distance, miss_distance / options.background_ratio

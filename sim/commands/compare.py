@@ -72,40 +72,38 @@ def _plot(report: dict[str, Any], folder: Path) -> None:
 
 def _print(report: dict[str, Any], folder: Path) -> None:
     console = Console(highlight=False)
-    table = Table(title="medians over the runs (worst in parentheses)", title_justify="left")
-    for heading in (
-        "scenario",
-        "runs",
-        "DCPF",
-        "CPF",
-        "best single",
-        "DCPF/CPF",
-        "lost",
-        "ANEES",
-        "disagree",
-    ):
-        table.add_column(heading, justify="left" if heading == "scenario" else "right")
+    table = Table()
+    table.add_column("scenario", no_wrap=True)
+    table.add_column("over the runs", no_wrap=True)
+    for heading in ("DCPF", "CPF", "best single", "DCPF/CPF", "ANEES"):
+        table.add_column(heading, justify="right", no_wrap=True)
     for label, each in report.items():
         rmse = each["rmse_m"]
-        lost = each["lost_fraction"]["dcpf"]
-        table.add_row(
-            label,
-            str(each["runs"]),
-            *(_spread(rmse[name], " m", 3) for name in ("dcpf", "cpf", "best_single")),
-            _spread(each["ratio_dcpf_cpf"], "", 2),
-            f"{lost:.0%}",
-            _spread(each["anees"]["dcpf"], "", 2),
-            _spread(each["disagreement_m"], " m", 3),
-        )
+        for title, row, statistic in (
+            ("median", label, "median"),
+            ("worst", f"  {each['runs']} runs", "max"),
+        ):
+            table.add_row(
+                row,
+                title,
+                *(_figure(rmse[name], statistic, " m", 3) for name in ("dcpf", "cpf", "best_single")),
+                _figure(each["ratio_dcpf_cpf"], statistic, "", 2),
+                _figure(each["anees"]["dcpf"], statistic, "", 2),
+            )
     console.print(table)
     for label, each in report.items():
+        lost, disagreement = each["lost_fraction"], _figure(each["disagreement_m"], "median", " m", 3)
+        console.print(
+            f"{label}: target lost in {lost['dcpf']:.0%} of the runs by DCPF, in {lost['cpf']:.0%} by CPF;"
+            f" nodes disagree by {disagreement}",
+            soft_wrap=True,
+        )
         indefinite = each["indefinite_local_fraction"]
         if indefinite and indefinite["max"]:
-            console.print(
-                f"{label}: Eq. 17's ratio was no density in {indefinite['median']:.0%} of the local results"
-            )
+            share = f"{indefinite['median']:.0%}"
+            console.print(f"  Eq. 17's ratio was no density in {share} of the local results", soft_wrap=True)
     console.print(f"figures and plots in {folder}", soft_wrap=True)
 
 
-def _spread(values: dict[str, float] | None, unit: str, digits: int) -> str:
-    return "–" if values is None else f"{values['median']:.{digits}f}{unit} ({values['max']:.{digits}f})"
+def _figure(values: dict[str, float] | None, statistic: str, unit: str, digits: int) -> str:
+    return "–" if values is None else f"{values[statistic]:.{digits}f}{unit}"

@@ -37,6 +37,8 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
             # Whoever read the output has heard enough; nothing more can be written there.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             code = 0
+        except OSError as error:
+            _fail(f"{error.filename or 'the output'}: {error.strerror}: make room, or name another place", 2)
         raise typer.Exit(code or 0)
 
     return run

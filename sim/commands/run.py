@@ -53,6 +53,7 @@ def run(
     chosen = read_scenario(scenario, overrides, seed=seed, frames=frames, pace=pace, name=name)
     folder = out or default_folder(chosen)
     assembly = Assembly(chosen)
+    _check_by_hand(by_hand or [], assembly, in_process=in_process)
     with Recorder(folder, chosen) as recorder, progress_bar(f"{chosen.name}: frames", chosen.frames) as bar:
         dead: list[str] = []
         if in_process:
@@ -78,13 +79,27 @@ def run(
     return 1 if dead or (fail_if_lost and lost) else 0
 
 
+def _check_by_hand(names: list[str], assembly: Assembly, *, in_process: bool) -> None:
+    unknown = [name for name in names if name not in assembly.links]
+    if unknown:
+        raise typer.BadParameter(
+            f"there is no node {unknown[0]}: the nodes are {', '.join(assembly.links)}",
+            param_hint="--by-hand",
+        )
+    if names and in_process:
+        raise typer.BadParameter(
+            "with --in-process, no node is left to start by hand", param_hint="--by-hand"
+        )
+
+
 def _print(summary: dict[str, Any], scenario: Scenario, folder: Path) -> None:
     console = Console(highlight=False)
-    table = Table(
-        title=f"{summary['scenario']}, {summary['preset']} preset, seed {summary['seed']},"
+    console.print(
+        f"{summary['scenario']}, {summary['preset']} preset, seed {summary['seed']},"
         f" {summary['frames']} frames, {summary['processes']} processes",
-        title_justify="left",
+        soft_wrap=True,
     )
+    table = Table()
     for heading in ("estimator", "RMSE", "lost", "ANEES"):
         table.add_column(heading, justify="left" if heading == "estimator" else "right")
     rmse, lost, anees = summary["rmse_m"], summary["lost"], summary["anees"]
@@ -107,7 +122,7 @@ def _print(summary: dict[str, Any], scenario: Scenario, folder: Path) -> None:
         first, rate = timing["first_estimate_s"], timing["frames_per_s"]
         console.print(f"first estimate after {first:.1f} s, then {rate:.0f} frames/s")
     if summary["died"]:
-        console.print(f"died on the way: {', '.join(summary['died'])}")
+        console.print(f"did not reach the end: {', '.join(summary['died'])}")
     console.print(f"recorded in {folder}", soft_wrap=True)
 
 

@@ -21,6 +21,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import cv2
+
 from network import sessions
 from network.errors import NetworkError
 from nodes.sources import SourceError
@@ -48,6 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # The launcher says when to leave; Ctrl-C in a terminal reaches everybody.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    # No thread survives a fork: OpenCV must not start its own for what all nodes share.
+    cv2.setNumThreads(1)
     assembly = Assembly(load_scenario(parsed.scenario))
     assembly.prepare()
     endpoints = run_endpoints(assembly.scenario, parsed.sockets, parsed.by_hand)

@@ -50,6 +50,8 @@ class Launch:
         self._assembly, self._recorder, self._progress, self._by_hand = assembly, recorder, progress, by_hand
         self._heard: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
         self._nodes = {node for _, node in expected_tracks(assembly.scenario)}
+        self._absent_since: dict[str, float] = {}
+        self._refused: set[tuple[str, str]] = set()
         self._truth_next = 0
         self._frames_done = 0
 
@@ -74,19 +76,22 @@ class Launch:
             )
             session = sessions.open_client(run_endpoints(self._assembly.scenario, folder, []).router)
             stack.callback(sessions.close, session)
+            # However it ends, nodes that somebody else has started shall know.
+            stack.callback(publish, session, self._assembly.scenario.name, ControlMessage("stop"))
             self._listen(session)
             self._wait_until_ready(children)
             self._start(session)
             started = time.monotonic()
-            for message in self._messages(children):
-                self._take(message, session)
-                first = isinstance(message, EstimateMessage) and message.frame == 1
-                if first and "first_estimate_s" not in self.results.timing:
-                    self.results.timing["first_estimate_s"] = round(time.monotonic() - began, 3)
-            elapsed = time.monotonic() - started
-            publish(session, self._assembly.scenario.name, ControlMessage("stop"))
-            self.results.timing["frames_per_s"] = round(self._assembly.scenario.frames / elapsed, 2)
-            self._tell_truth(session, self._assembly.scenario.frames)
+            try:
+                for message in self._messages(children):
+                    self._take(message, session)
+                    first = isinstance(message, EstimateMessage) and message.frame == 1
+                    if first and "first_estimate_s" not in self.results.timing:
+                        self.results.timing["first_estimate_s"] = round(time.monotonic() - began, 3)
+                elapsed = time.monotonic() - started
+                self.results.timing["frames_per_s"] = round(self._assembly.scenario.frames / elapsed, 2)
+            finally:
+                self._tell_truth(session, self._frames_done)
         return self.results
 
     def _listen(self, session: zenoh.Session) -> None:
@@ -100,7 +105,7 @@ class Launch:
         """The start barrier: every node hears those that it has to."""
         limit = None if self._by_hand else time.monotonic() + START_LIMIT_S
         ready: set[str] = set()
-        while ready < self._nodes:
+        while not ready >= self._nodes:
             message = self._next()
             if isinstance(message, StatusMessage) and message.state == "ready":
                 ready.add(message.node)
@@ -118,23 +123,35 @@ class Launch:
         publish(session, self._assembly.scenario.name, ControlMessage("start", start_time_s))
 
     def _messages(self, children: Children) -> Iterator[EstimateMessage | StatusMessage | None]:
-        """What the nodes tell, until all have told their last or have died."""
-        working = set(self._nodes)
+        """What the nodes tell, until all have told their last, have died, or are heard of no more."""
+        working, ended = set(self._nodes), dict[str, int]()
         while working:
             message = self._next()
             yield message
             if isinstance(message, StatusMessage) and message.state in ("done", "failed"):
                 working.discard(message.node)
-            for name, code in children.ended():
-                if name in working and not self._heard.qsize():
-                    working.discard(name)
-                    self._bury(name, code)
+                if message.state == "failed":
+                    self._bury(message.node, "left", "left before the end")
+            ended.update(children.ended())
+            if not self._heard.empty():
+                continue  # what they said before is heard first
+            for name in sorted(working & ended.keys()):
+                code, last_words = ended[name], children.last_words(name)
+                self._bury(name, "died", f"died (exit code {code}): {last_words}", exit_code=code)
+            for name in sorted((working - ended.keys()) & self._silent()):
+                self._bury(name, "silent", "is heard of no more")
+            working.difference_update(self.dead)
 
-    def _bury(self, name: str, code: int) -> None:
+    def _silent(self) -> set[str]:
+        """Nodes that have been away for longer than anybody waits for them: stopped, or dead elsewhere."""
+        limit = time.monotonic() - self._assembly.scenario.network.deadline_s
+        return {name for name, since in self._absent_since.items() if since < limit}
+
+    def _bury(self, name: str, event: str, what: str, **details: int) -> None:
         self.dead.append(name)
-        self._recorder.event("died", name, exit_code=code)
+        self._recorder.event(event, name, **details)
         self._recorder.forget(name)
-        _log.error("node %s died (exit code %d); the others go on", name, code)
+        _log.error("node %s %s; the others go on", name, what)
 
     def _next(self) -> EstimateMessage | StatusMessage | None:
         """The next valid message, None if there is none for a while."""
@@ -143,21 +160,32 @@ class Launch:
         except queue.Empty:
             return None
         key, data = str(sample.key_expr), sample.payload.to_bytes()
-        if key.endswith("/alive"):
-            seen = sample.kind == zenoh.SampleKind.PUT
-            self._recorder.event("seen" if seen else "lost", keys.node_of(key), frame=self._frames_done)
+        _, _, node, kind = key.split("/")
+        if node not in self._nodes:
+            return None  # somebody else's
+        if kind == "alive":
+            self._see(node, here=sample.kind == zenoh.SampleKind.PUT)
             return None
         try:
-            if key.endswith("/estimate"):
-                return codec.decode_public(EstimateMessage, data)
-            return codec.decode_public(StatusMessage, data)
+            return _decode(node, kind, data)
         except RefusedMessage as refusal:
-            self._recorder.event("refused", keys.node_of(key), reason=refusal.reason)
+            if (node, refusal.reason) not in self._refused:
+                self._recorder.event("refused", node, reason=refusal.reason)
+            self._refused.add((node, refusal.reason))
             return None
+
+    def _see(self, node: str, *, here: bool) -> None:
+        """A node's token has come or gone."""
+        if here:
+            self._absent_since.pop(node, None)
+        else:
+            self._absent_since[node] = time.monotonic()
+        self._recorder.event("seen" if here else "lost", node, frame=self._frames_done)
 
     def _take(self, message: EstimateMessage | StatusMessage | None, session: zenoh.Session) -> None:
         if message is None:
-            self._tell_truth(session, min(self._truth_next + 1, self._frames_done))
+            if self._assembly.scenario.pace == "realtime":
+                self._tell_truth(session, min(self._truth_next + 1, self._frames_done))
             return
         self.results.add(message)
         self._recorder.add(message)
@@ -166,7 +194,11 @@ class Launch:
             self._progress(self._frames_done)
 
     def _tell_truth(self, session: zenoh.Session, until: int) -> None:
-        """Publishes and records the truth of frames that are done; when there is time, it takes some."""
+        """Publishes and records the truth of frames that are done.
+
+        Working out what each camera sees takes some time: in real time it is done when nothing else is, in
+        lockstep, where every processor is busy to the end, after the frames.
+        """
         while self._truth_next < until:
             message: TruthMessage | None = self._assembly.truth_message(self._truth_next)
             self._truth_next += 1
@@ -174,3 +206,19 @@ class Launch:
                 publish(session, self._assembly.scenario.name, message)
                 self.results.add(message)
                 self._recorder.add(message)
+
+
+def _decode(node: str, kind: str, data: bytes) -> EstimateMessage | StatusMessage:
+    """What a node tells, under a key of its own.
+
+    Raises:
+        RefusedMessage: It is something else, or of somebody else.
+    """
+    message: EstimateMessage | StatusMessage
+    if kind == "estimate":
+        message = codec.decode_public(EstimateMessage, data)
+    else:
+        message = codec.decode_public(StatusMessage, data)
+    if message.node != node:
+        raise RefusedMessage("sender")
+    return message

@@ -59,3 +59,4 @@ def _listen(key: str, endpoint: str, heard: queue.SimpleQueue[zenoh.Sample | Net
         heard.put(error)
         return
     session.declare_subscriber(expression, zenoh.handlers.Callback(heard.put))
+    threading.Event().wait()  # for ever: a session that nobody holds is closed

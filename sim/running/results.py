@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from network.messages import EstimateMessage, StatusMessage, TruthMessage
-from sim.running.metrics import anees, disagreement, is_lost, position_errors, rmse
+from sim.running.metrics import LOST_FRAMES, anees, disagreement, is_lost, position_errors, rmse
 from sim.scenario.model import Scenario
 
 Track = tuple[str, str]
@@ -146,7 +146,9 @@ def _rmse(errors: Float[np.ndarray, " T"] | None) -> float | None:
 
 def _any_lost(errors: list[Float[np.ndarray, " T"] | None]) -> bool | None:
     known = [e for e in errors if e is not None]
-    return any(is_lost(e) for e in known) if known else None
+    # A node that died on the way has not lost the target, unless nobody is left who knows where it is.
+    to_the_end = [e for e in known if not np.isnan(e[-LOST_FRAMES:]).all()]
+    return any(is_lost(e) for e in to_the_end or known) if known else None
 
 
 def _anees(results: Results, tracks: list[Track]) -> float | None:
@@ -219,5 +221,5 @@ def _timing(results: Results) -> dict[str, Any]:
     return timing
 
 
-def _plain(value: float | Mapping[str, float] | None) -> float:
-    return 0 if value is None or isinstance(value, Mapping) else value
+def _plain(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else 0.0

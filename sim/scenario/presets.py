@@ -34,7 +34,7 @@ ROBUST: Mapping[str, Any] = {
         },
         "sampling": {"grid": [15, 15], "kernel": "epanechnikov"},
         "likelihood": {"calibration": "background"},
-        "model_update": {"alpha": 0.1},
+        "model_update": {"alpha": 0.05},
     },
     "fusion": {"rule": "net_information", "local_particles": "shared", "proposal": "optimal"},
 }

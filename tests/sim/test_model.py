@@ -15,7 +15,10 @@ IDENTITY = "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]"
 MISTAKES = {
     "two calibrations": ([("cameras.A.K", IDENTITY)], "camera A is calibrated in two ways"),
     "half a look": ([("cameras.A.look_at", "null")], "camera A needs position, look_at and focal_px"),
-    "half the matrices": ([("cameras.A", f"{{name: A, K: {IDENTITY}}}")], "camera A needs K, R and t together"),
+    "half the matrices": (
+        [("cameras.A", f"{{name: A, K: {IDENTITY}}}")],
+        "camera A needs K, R and t together",
+    ),
     "no calibration": ([("cameras.A", "{name: A}")], "camera A is not calibrated"),
     "no size": ([("cameras.A.size_px", "null")], "camera A needs size_px"),
     "straight down": ([("cameras.A.look_at", "[-5, -2, 0]")], "camera A looks straight up or down"),
@@ -39,7 +42,10 @@ MISTAKES = {
     "an edge to oneself": ([("network.graph", "[[A, A]]")], "edge A-A joins a node to itself"),
     "world and footage": ([("footage", "{folder: x}")], "world or footage, one of them"),
     "neither": ([("world", "null")], "world or footage, one of them"),
-    "footage twice": ([("world", "null"), ("footage", "{folder: x, name: y}")], "footage needs name or folder"),
+    "footage twice": (
+        [("world", "null"), ("footage", "{folder: x, name: y}")],
+        "footage needs name or folder",
+    ),
     "one frame": ([("frames", "1")], "frames must be greater than or equal to 2, got 1"),
     "no camera": ([("cameras", "[]")], "cameras"),
     "no such key": ([("filter.n_particle", "3")], r"filter.n_particle .*did you mean n_particles\?"),

@@ -18,7 +18,7 @@ from sim.scenario.loading import load_scenario
 
 FOLDER = Path(__file__).parents[2] / "scenarios"
 SCENARIOS = sorted(FOLDER.glob("*.yaml"))
-BRIEF = [("frames", "3"), ("filter.n_particles", "20")]
+BRIEF = [("frames", "2"), ("filter.n_particles", "20")]
 
 
 @pytest.fixture(params=SCENARIOS, ids=lambda path: path.stem)

@@ -1,0 +1,200 @@
+"""The command line: exit codes, one sentence for each mistake, and never a traceback."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from sim.commands.app import app
+from sim.commands.inspect import scenario_schema
+from sim.running import listener
+
+BRIEF = ["--frames", "3", "--set", "filter.n_particles=10"]
+
+
+@pytest.fixture
+def dcpf(tmp_path, monkeypatch):
+    """Runs a command in an empty folder, without footage."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("DCPF_CACHE", str(tmp_path / "cache"))
+
+    def run(*arguments):
+        result = CliRunner().invoke(app, [str(each) for each in arguments])
+        assert isinstance(result.exception, SystemExit | None)
+        return result
+
+    return run
+
+
+FOOTAGE = """
+    {name: film, frames: 2, rate_hz: 10, footage: {name: swimcap}, target: {space: plane, height: 0.2},
+     cameras: [{name: A, video: a.mp4}]}
+    """
+
+MISTAKES = {
+    "no such file": (["run", "none.yaml"], "none.yaml: there is no such file: check the path"),
+    "a folder": (["check", "."], ".: is a folder: name the scenario file in it"),
+    "an empty file": (["check", "empty.yaml"], "empty.yaml: is empty"),
+    "footage not fetched": (["run", "film.yaml"], "film.yaml: footage swimcap is not in"),
+    "footage unknown": (["footage", "nope"], "there is no footage nope: choose one of swimcap"),
+    "--set without =": (["run", "small.yaml", "--set", "frames"], "--set frames: has no ="),
+    "--set of no number": (
+        ["run", "small.yaml", "--set", "frames=x"],
+        "--set frames=x: frames must be a whole",
+    ),
+    "--set of no key": (
+        ["check", "small.yaml", "--set", "fliter.x=1"],
+        "--set fliter.x=1: fliter is not a key",
+    ),
+    "a name that is no key": (["run", "small.yaml", "--name", "a b"], "'a b' cannot name a run or node"),
+    "an unknown node": (["node", "Z", "small.yaml"], "has no node Z: its nodes are A, B, C, D, central"),
+    "no place to listen": (["node", "A", "small.yaml", "--listen", "x"], "cannot listen on x"),
+    "unknown by hand": (
+        ["run", "small.yaml", "--by-hand", "Z"],
+        "there is no node Z: the nodes are A, B, C, D",
+    ),
+    "by hand in process": (
+        ["run", "small.yaml", "--in-process", "--by-hand", "A"],
+        "no node is left to start",
+    ),
+    "an out that is a file": (
+        ["run", "small.yaml", "--in-process", "--out", "empty.yaml"],
+        "name another --out",
+    ),
+    "no run": (["clip", "."], ".: is not the folder of a run"),
+    "a key with a hole": (["watch", "a//b"], "a//b is no key expression"),
+    "no endpoint": (["watch", "--connect", "x"], "nothing answers at x"),
+    "nothing to compare": (["compare"], "Missing argument"),
+    "one of two is missing": (["compare", "small.yaml", "none.yaml"], "none.yaml: there is no such file"),
+    "a negative seed": (["run", "small.yaml", "--seed", "-1"], "--seed"),
+    "no command": (["frobnicate"], "No such command"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "sentence"), MISTAKES.values(), ids=MISTAKES)
+@pytest.mark.usefixtures("small")
+def test_a_mistake_is_answered_in_a_sentence(dcpf, tmp_path, arguments, sentence):
+    (tmp_path / "empty.yaml").touch()
+    (tmp_path / "film.yaml").write_text(FOOTAGE, encoding="utf-8")
+
+    result = dcpf(*arguments)
+
+    assert result.exit_code == 2
+    assert sentence in result.stderr
+    assert "Traceback" not in result.stderr
+    assert not result.stdout
+
+
+def test_check_says_what_would_run(dcpf, small):
+    facts = json.loads(dcpf("check", small, "--set", "network.graph=path", "--json").stdout)
+
+    assert facts["scenario"] == "small"
+    assert facts["cameras"] == {name: [160, 120] for name in "ABCD"}
+    assert facts["graph"] == [["A", "B"], ["B", "C"], ["C", "D"]]
+    assert facts["processes"] == 6
+    assert facts["ground_truth"] is True
+    assert len(facts["start"]) == 4
+
+
+def test_check_is_a_table_for_people(dcpf, small):
+    result = dcpf("check", small)
+
+    assert result.exit_code == 0
+    assert "is valid" in result.stdout
+    assert "talks to B, D" in result.stdout
+
+
+def test_schema_is_json(dcpf):
+    assert json.loads(dcpf("schema").stdout) == scenario_schema()
+
+
+def test_a_run_prints_its_summary_and_writes_its_folder(dcpf, small, tmp_path):
+    result = dcpf("run", small, "--in-process", *BRIEF, "--seed", 4, "--name", "mine", "--json")
+
+    summary = json.loads(result.stdout)
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert result.exit_code == 0
+    assert folder.name.startswith("mine-")
+    assert json.loads((folder / "summary.json").read_text()) == summary
+    assert (summary["scenario"], summary["seed"], summary["frames"]) == ("mine", 4, 3)
+
+
+def test_a_run_is_a_table_for_people(dcpf, small):
+    result = dcpf("run", small, "--in-process", *BRIEF, "--out", "run")
+
+    assert "small, robust preset, seed 0, 3 frames, 1 processes" in result.stdout
+    assert "DCPF (all nodes)" in result.stdout
+    assert result.stdout.endswith("recorded in run\n")
+
+
+def test_a_lost_target_fails_the_run_that_asks_for_it(dcpf, small):
+    astray = ["--set", "target.start.position=[9, 9]", *BRIEF, "--in-process"]
+
+    assert dcpf("run", small, *astray).exit_code == 0
+    assert dcpf("run", small, *astray, "--fail-if-lost").exit_code == 1
+    assert dcpf("run", small, *BRIEF, "--in-process", "--fail-if-lost").exit_code == 0
+
+
+def test_compare_writes_figures_and_plots(dcpf, small, tmp_path):
+    result = dcpf("compare", small, "--runs", 2, "--jobs", 1, *BRIEF, "--out", "out", "--json")
+
+    report = json.loads(result.stdout)["small (robust)"]
+    assert report["runs"] == 2
+    assert [each["seed"] for each in report["summaries"]] == [0, 1]
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "comparison.json",
+        "comparison.svg",
+        "comparison.png",
+    }
+
+
+def test_nobody_who_reads_the_output_is_no_failure():
+    command = [sys.executable, "-c", "from sim.commands import main; main()", "schema"]
+
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert not process.stderr.read()
+
+    assert process.returncode == 0
+
+
+def test_an_output_that_is_full_is_told_in_a_sentence(small):
+    command = [sys.executable, "-c", "from sim.commands import main; main()", "check", small, "--json"]
+
+    with Path("/dev/full").open("wb") as full:
+        result = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+
+    assert result.returncode == 2
+    assert (
+        result.stderr.strip() == "dcpf: the output: No space left on device: make room, or name another place"
+    )
+
+
+def test_ctrl_c_before_the_command_has_begun_ends_it_without_a_word():
+    command = [sys.executable, "-c", "from sim.commands import main; print(1, flush=True); main()", "schema"]
+
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.readline()
+        time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        assert not process.stderr.read()
+
+    assert process.returncode in (-signal.SIGINT, 130, 0)
+
+
+def test_watch_goes_on_until_it_is_ended(dcpf, monkeypatch):
+    def interrupted(*_):
+        yield None
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(listener, "estimates", interrupted)
+
+    result = dcpf("watch", "--json")
+
+    assert result.exit_code == 130
+    assert result.stderr == "dcpf: interrupted\n"
