@@ -35,7 +35,7 @@ _ENCODINGS = {
     kind: f"application/json;dcpf.{kind.kind}.v1"
     for kind in (EstimateMessage, StatusMessage, ControlMessage, TruthMessage)
 }
-_WATCH_PERIOD_S = 0.004
+_WATCH_PERIOD_S = 0.01
 _WAKE_UP = b""
 
 _Inbox = zenoh.Subscriber[zenoh.handlers.Handler[zenoh.Sample]]

@@ -5,6 +5,7 @@ averaged over the channels, each normalised, and over the parts of the target by
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -59,6 +60,7 @@ def normalize_counts(
     return counts.reshape(shape) / np.maximum(pixels, 1)[:, :, None, None]
 
 
+@lru_cache
 def full_codebook(options: ColorOptions) -> Codebook:
     """A codebook that tells every bin apart."""
     return codebook(np.ones((len(options.parts), options.n_channels, options.n_bins), bool), options.parts)

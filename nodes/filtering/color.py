@@ -13,8 +13,8 @@ from pydantic import Field, model_validator
 
 from network.options import Options
 
-GAIN_GRID_PX = 16
-"""Every sixteenth pixel of every sixteenth line is enough for a median."""
+GAIN_GRID_PX = 24
+"""Every 24th pixel of every 24th line is enough for a median."""
 
 
 class ColorOptions(Options):

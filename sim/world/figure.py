@@ -81,8 +81,8 @@ def _tube(
 def _build() -> _Body:
     """Joins the tubes, and says how each moves."""
     tubes = [
-        _tube(_HEAD, 8, 0.0), _tube(_TORSO, 8, 0.0),
-        _tube(_ARM, 6, 0.112), _tube(_ARM, 6, -0.112), _tube(_LEG, 6, 0.047), _tube(_LEG, 6, -0.047),
+        _tube(_HEAD, 6, 0.0), _tube(_TORSO, 8, 0.0),
+        _tube(_ARM, 5, 0.112), _tube(_ARM, 5, -0.112), _tube(_LEG, 5, 0.047), _tube(_LEG, 5, -0.047),
     ]  # fmt: skip
     rest = np.concatenate([vertices for vertices, _ in tubes])
     counts = [len(vertices) for vertices, _ in tubes]
