@@ -63,6 +63,9 @@ def run(
                 recorder.add(message)
                 bar(results.frames_done)
         else:
+            for node in by_hand or []:
+                hint = f"waiting for {node}: start it with dcpf node {node} {scenario}"
+                Console(stderr=True).print(hint, highlight=False, markup=False, soft_wrap=True)
             # Zenoh is imported by those who need it: it takes its time.
             from sim.running.launcher import Launch
 

@@ -104,7 +104,9 @@ class Children:
             pids: dict[str, int] = json.loads(line)["started"]
             return pids
         if self._host.wait() == 2:
-            raise NetworkError(self.last_words("host"))
+            raise NetworkError(
+                f"{self.last_words('host')}; another endpoint: --set network.router=tcp/127.0.0.1:7500"
+            )
         raise RunFailed(f"the host of the run's processes could not start: {self.last_words('host')}")
 
     def _listen(self) -> None:

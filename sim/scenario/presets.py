@@ -53,13 +53,13 @@ rows of samples to do so."""
 
 
 def preset_defaults(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """What the preset that a scenario names fills in; nothing where it names none that there is.
+    """What the preset that a scenario names fills in; that of the default where it names none that there is.
 
     Args:
         data: The scenario as its author wrote it.
     """
     name = data.get("preset", "robust")
-    defaults = {"paper": PAPER, "robust": ROBUST}.get(name if isinstance(name, str) else "", {})
+    defaults = PAPER if name == "paper" else ROBUST
     if name == "robust" and _is_person(data.get("target")):
         defaults = _merged(defaults, PERSON_PARTS)
     network = data.get("network")
