@@ -1,8 +1,11 @@
 """Hears every estimate of every run: needs eclipse-zenoh and the standard library only."""
 
 import json
+import signal
 
 import zenoh
+
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C, also while no run is there yet
 
 config = zenoh.Config.from_json5(
     """{mode: "client", scouting: {multicast: {enabled: false}},

@@ -73,7 +73,7 @@ def read_opencv(path: Path, name: str) -> Camera:
         R = np.reshape(need("R", 9), (3, 3))
     else:
         R = np.asarray(cv2.Rodrigues(np.array(need("rvec", 3)))[0], dtype=np.float64)
-    return _camera(
+    return checked_camera(
         f"{path}",
         name,
         size_px,
@@ -214,10 +214,10 @@ def _qualisys_camera(element: _Element) -> Camera:
         number("intrinsic", "tangentalDistortion2"),
         number("intrinsic", "radialDistortion3"),
     ]
-    return _camera(f"{element.path}: camera {name}", name, size_px, K, R, -R @ center, distortion)
+    return checked_camera(f"{element.path}: camera {name}", name, size_px, K, R, -R @ center, distortion)
 
 
-def _camera(
+def checked_camera(
     source: str,
     name: str,
     size_px: Sequence[float],
@@ -226,7 +226,20 @@ def _camera(
     t: Float[np.ndarray, " 3"],
     distortion: Sequence[float],
 ) -> Camera:
-    """A camera, after checking that its numbers can be one's."""
+    """A camera, after checking that its numbers can be one's.
+
+    Args:
+        source: Whose numbers they are, for the error.
+        name: The camera.
+        size_px: Width and height of its pictures.
+        K: Intrinsic matrix, in pixels.
+        R: Rotation from world to camera axes.
+        t: Translation in metres.
+        distortion: Up to five coefficients in OpenCV's order.
+
+    Raises:
+        CalibrationError: They cannot be a camera's.
+    """
     if not all(np.isfinite(values).all() for values in (size_px, K, R, t, distortion)):
         raise CalibrationError(f"{source}: some numbers are not finite: calibrate again")
     if any(pixels < 1 or pixels != round(pixels) for pixels in size_px):

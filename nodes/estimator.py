@@ -5,6 +5,7 @@ from typing import Literal
 
 from network.messages import EstimateMessage
 from nodes.filtering.appearance import Appearance
+from nodes.filtering.fusion import propagate
 from nodes.filtering.gaussian import Moments
 from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.sighting import Sighting, shrinkage
@@ -28,6 +29,7 @@ class SirEstimator:
         self._rng = setup.stream(node, kind)
         self._particles = setup.first_particles(self._rng)
         self._sighting = Sighting()
+        self._last_frame = 0
 
     def begin(self, appearances: Mapping[str, Appearance | None]) -> EstimateMessage:
         """Frame 0: is told what the target looks like to each camera."""
@@ -45,6 +47,10 @@ class SirEstimator:
         """
         setup = self._setup
         views = {name: View(*pictures[name], self._appearances.get(name)) for name in sorted(pictures)}
+        # frames that were left out, for want of time, move the particles all the same
+        for _ in range(self._last_frame + 1, frame):
+            self._particles = propagate(self._particles, setup.motion, self._rng)
+        self._last_frame = frame
         # predict, reweight by all pictures, estimate, resample
         threshold = setup.filter.resampling.threshold
         self._particles, info = sir_step(

@@ -3,6 +3,7 @@
 A node's life is four lines: announce, wait for the start, one frame after the other, leave.
 """
 
+import math
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -135,12 +136,11 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
     first = source.read(0)
     if not shell.wait_for_start(links.neighbors + links.sinks):
         return
-    confirmed, done = -1, -1
+    confirmed, done = -1.0, -1
     for index in range(shell.frames):
         if not shell.await_frame(index):
             continue
         image = source.read(index) if index else first
-        deadline = shell.deadline(index)
         # pixels to the central node, which confirms them in lockstep
         if links.sinks:
             if shell.pace.kind == "lockstep":
@@ -153,7 +153,7 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         # rounds with the neighbours, and the fusion filter at their end
         began = time.perf_counter()
         _send(outgoing, shell)
-        _rounds(node, deadline, shell)
+        _rounds(node, shell.deadline(index), shell)
         shell.telemetry.consensus_round_s.append((time.perf_counter() - began) / max(node.rounds_done, 1))
         done = done if shell.stopped else index
         if index == 0:
@@ -182,15 +182,18 @@ def _rounds(node: SmartCamera, deadline: float, shell: Shell) -> None:
             deadline = time.monotonic() + shell.pace.deadline_s
 
 
-def _await_confirmation(sink: str, frame: int, confirmed: int, shell: Shell) -> int:
-    """Waits until the sink has confirmed a frame, or is gone; returns the last frame that it has."""
+def _await_confirmation(sink: str, frame: int, confirmed: float, shell: Shell) -> float:
+    """Waits until the sink has confirmed a frame, or is gone; returns the last frame that it has confirmed.
+
+    A sink that misses its deadline is not waited for again: infinity.
+    """
     limit = time.monotonic() + shell.pace.deadline_s
     while confirmed < frame and shell.transport.alive(sink) and not shell.stopped:
         message = shell.transport.receive(sink, PATIENCE_S)
         if isinstance(message, ConfirmMessage):
             confirmed = message.frame
         elif time.monotonic() > limit:
-            break
+            return math.inf
     return confirmed
 
 
@@ -203,10 +206,6 @@ def run_central(node: Central, shell: Shell) -> None:
         shell.await_frame(index)
         deadline = shell.deadline(index)
         while node.frame == index and node.cameras and not shell.stopped:
-            if not node.waiting_for:
-                # every picture of the frame has come while the one before was worked on
-                _send(node.on_deadline(), shell)
-                break
             camera = node.waiting_for[0]
             left = deadline - time.monotonic()
             message = shell.transport.receive(camera, min(max(left, 0.0), PATIENCE_S))
@@ -215,8 +214,9 @@ def run_central(node: Central, shell: Shell) -> None:
                 _send(node.on_message(message), shell)
                 if node.frame != index:
                     shell.telemetry.local_filter_s.append(time.perf_counter() - began)
-            elif not shell.transport.alive(camera):
+            elif not shell.transport.alive(camera) or (left <= 0 and shell.pace.kind == "lockstep"):
                 _send(node.on_lost(camera), shell)
+                deadline = shell.deadline(index)
             elif left <= 0:
                 shell.telemetry.late += 1
                 _send(node.on_deadline(), shell)

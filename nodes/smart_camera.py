@@ -70,6 +70,7 @@ class SmartCamera:
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
         self._frame: FrameInProgress | None = None
+        self._last_frame = 0
         self._single = SirEstimator(self.name, "single", setup) if with_single else None
 
     def on_frame(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> Outgoing:
@@ -82,6 +83,11 @@ class SmartCamera:
         if index == 0:
             return self._begin(image)
         picture = self._model.look(image)
+        # frames that were left out, for want of time, move the particles all the same
+        for _ in range(self._last_frame + 1, index):
+            self._particles = propagate(self._particles, self._motion, self._fusion_rng)
+            self._local_particles = propagate(self._local_particles, self._motion, self._local_rng)
+        self._last_frame = index
         # predict: χ(k) ~ P(χ(k) | χ(k-1))
         predicted = propagate(self._particles, self._motion, self._fusion_rng)
         # reweight by the own picture: u, p, v, r

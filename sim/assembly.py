@@ -174,13 +174,19 @@ class Assembly:
             return RenderedSource(self.world, self.cameras[camera], self.scenario.rate_hz)
         return video_source(self.scenario, camera)
 
-    def truth_message(self, frame: int) -> TruthMessage | None:
-        """The truth of a frame, with what each camera sees of the target where the world is rendered."""
+    def truth_message(self, frame: int, *, with_visibility: bool = True) -> TruthMessage | None:
+        """The truth of a frame.
+
+        Args:
+            frame: Its index.
+            with_visibility: Whether to work out what each camera sees of the target, where the world is
+                rendered; it takes some milliseconds.
+        """
         if self.truth is None:
             return None
         time_s = frame / self.scenario.rate_hz
         seen: dict[str, Visibility] = {}
-        if self.world is not None:
+        if self.world is not None and with_visibility:
             person = str(self.scenario.target.person)
             for name, camera in self.cameras.items():
                 sight = visibility(self.world, camera, person, time_s)

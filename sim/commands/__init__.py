@@ -1,7 +1,11 @@
 """The command line: what a person runs. Each command is a module; the work is done elsewhere."""
 
 import signal
+import time
 from typing import NoReturn
+
+BEGAN_S = time.monotonic()
+"""When the user's command began, before the imports that take their time."""
 
 
 def main() -> NoReturn:

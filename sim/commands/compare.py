@@ -40,6 +40,8 @@ def compare(
                 summaries.append(summary)
                 bar(len(summaries) + runs * len(report))
             label = f"{scenario.name} ({scenario.preset})"
+            if label in report:
+                label = f"{path} ({scenario.preset})"
             report[label] = {**compare_runs(summaries), "summaries": summaries}
     try:
         (folder / "comparison.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")

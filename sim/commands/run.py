@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from sim.assembly import Assembly
+from sim.commands import BEGAN_S
 from sim.commands.shared import (
     AsJson,
     Frames,
@@ -53,6 +54,8 @@ def run(
     chosen = read_scenario(scenario, overrides, seed=seed, frames=frames, pace=pace, name=name)
     folder = out or default_folder(chosen)
     assembly = Assembly(chosen)
+    # What is wrong with the start or the truth shall be said before anything is written.
+    _ = assembly.start, assembly.truth
     _check_by_hand(by_hand or [], assembly, in_process=in_process)
     with Recorder(folder, chosen) as recorder, progress_bar(f"{chosen.name}: frames", chosen.frames) as bar:
         dead: list[str] = []
@@ -64,12 +67,12 @@ def run(
                 bar(results.frames_done)
         else:
             for node in by_hand or []:
-                hint = f"waiting for {node}: start it with dcpf node {node} {scenario}"
+                hint = f"waiting for {node}: start it with dcpf node {node} {scenario}, and the same options"
                 Console(stderr=True).print(hint, highlight=False, markup=False, soft_wrap=True)
             # Zenoh is imported by those who need it: it takes its time.
             from sim.running.launcher import Launch
 
-            launch = Launch(assembly, recorder, bar, by_hand or [])
+            launch = Launch(assembly, recorder, bar, by_hand or [], BEGAN_S)
             results, dead = launch.run(), launch.dead
         summary = summarize(results, processes=1 if in_process else chosen.n_processes)
         summary["died"] = dead

@@ -6,6 +6,9 @@ Node for node and bit for bit what the processes compute, without their start; t
 import time
 from collections.abc import Iterable, Iterator, Mapping
 
+import cv2
+from threadpoolctl import threadpool_limits
+
 from network.memory import MemoryNetwork
 from network.messages import (
     ConsensusMessage,
@@ -32,6 +35,9 @@ def run_in_process(assembly: Assembly) -> Iterator[Told]:
     Raises:
         SourceError: A video cannot be read.
     """
+    # As in the processes, so that no sum is split in another way.
+    cv2.setNumThreads(1)
+    threadpool_limits(1)
     scenario = assembly.scenario
     cameras = {name: assembly.smart_camera(name) for name in sorted(assembly.cameras)}
     sources = {name: assembly.source(name) for name in cameras}

@@ -24,6 +24,8 @@ _log = logging.getLogger(__name__)
 START_LIMIT_S = 60.0
 """How long the nodes of the launcher have for getting ready."""
 IDLE_S = 0.1
+STUCK_DEADLINES = 4
+"""When nothing at all is heard for so many deadlines, those that have not finished are given up."""
 LEAD_S = 0.2
 """In real time, frame 0 begins this long after the order to start."""
 
@@ -35,7 +37,12 @@ class Launch:
     """A run in processes, from the first to the last. Everything that the launcher does is in here."""
 
     def __init__(
-        self, assembly: Assembly, recorder: Recorder, progress: Progress, by_hand: Sequence[str]
+        self,
+        assembly: Assembly,
+        recorder: Recorder,
+        progress: Progress,
+        by_hand: Sequence[str],
+        began: float,
     ) -> None:
         """A run that has not begun.
 
@@ -44,13 +51,16 @@ class Launch:
             recorder: Where it is recorded.
             progress: Told how far it is.
             by_hand: Nodes that somebody else starts.
+            began: When the user's command began, on the monotonic clock.
         """
+        self._began = began
         self.results = Results(assembly.scenario)
         self.dead: list[str] = []
         self._assembly, self._recorder, self._progress, self._by_hand = assembly, recorder, progress, by_hand
         self._heard: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
         self._nodes = {node for _, node in expected_tracks(assembly.scenario)}
         self._absent_since: dict[str, float] = {}
+        self._last_heard = time.monotonic()
         self._refused: set[tuple[str, str]] = set()
         self._truth_next = 0
         self._frames_done = 0
@@ -67,10 +77,11 @@ class Launch:
             RecordingError: The run cannot be recorded.
             KeyboardInterrupt: It was interrupted; every process has ended.
         """
-        began = time.monotonic()
         folder = Path(tempfile.mkdtemp(prefix="dcpf-"))
         recorded = self._recorder.folder
-        with ExitStack() as stack:
+        # The truth is known without the processes: it is written when they have gone, however that was.
+        with ExitStack() as ends, ExitStack() as stack:
+            ends.callback(self._record_truth)
             children = stack.enter_context(
                 Children(recorded / "scenario.yaml", recorded / "logs", folder, self._by_hand)
             )
@@ -81,17 +92,15 @@ class Launch:
             self._listen(session)
             self._wait_until_ready(children)
             self._start(session)
-            started = time.monotonic()
-            try:
-                for message in self._messages(children):
-                    self._take(message, session)
-                    first = isinstance(message, EstimateMessage) and message.frame == 1
-                    if first and "first_estimate_s" not in self.results.timing:
-                        self.results.timing["first_estimate_s"] = round(time.monotonic() - began, 3)
-                elapsed = time.monotonic() - started
-                self.results.timing["frames_per_s"] = round(self._assembly.scenario.frames / elapsed, 2)
-            finally:
-                self._tell_truth(session, self._frames_done)
+            started = self._last_heard = time.monotonic()
+            for message in self._messages(children):
+                self._take(message, session)
+                first = isinstance(message, EstimateMessage) and message.frame == 1
+                if first and "first_estimate_s" not in self.results.timing:
+                    self.results.timing["first_estimate_s"] = round(time.monotonic() - self._began, 3)
+            elapsed = time.monotonic() - started
+            self.results.timing["frames_per_s"] = round(self._assembly.scenario.frames / elapsed, 2)
+            self._tell_truth(session, self._frames_done)
         return self.results
 
     def _listen(self, session: zenoh.Session) -> None:
@@ -140,7 +149,14 @@ class Launch:
                 self._bury(name, "died", f"died (exit code {code}): {last_words}", exit_code=code)
             for name in sorted((working - ended.keys()) & self._silent()):
                 self._bury(name, "silent", "is heard of no more")
+            for name in sorted((working - ended.keys() - self._silent()) & self._stuck(working)):
+                self._bury(name, "stuck", "is there but tells nothing")
             working.difference_update(self.dead)
+
+    def _stuck(self, working: set[str]) -> set[str]:
+        """Nodes that are there but have told nothing since everybody was waited for: spinning, or hung."""
+        limit = time.monotonic() - STUCK_DEADLINES * self._assembly.scenario.network.deadline_s
+        return working if self._last_heard < limit else set()
 
     def _silent(self) -> set[str]:
         """Nodes that have been away for longer than anybody waits for them: stopped, or dead elsewhere."""
@@ -159,6 +175,7 @@ class Launch:
             sample = self._heard.get(timeout=IDLE_S)
         except queue.Empty:
             return None
+        self._last_heard = time.monotonic()
         key, data = str(sample.key_expr), sample.payload.to_bytes()
         _, _, node, kind = key.split("/")
         if node not in self._nodes:
@@ -192,6 +209,14 @@ class Launch:
         if isinstance(message, EstimateMessage) and message.frame >= self._frames_done:
             self._frames_done = message.frame + 1
             self._progress(self._frames_done)
+
+    def _record_truth(self) -> None:
+        """Records the truth of frames that are done and not told: those of an interrupted run, in short."""
+        for frame in range(self._truth_next, self._frames_done):
+            message = self._assembly.truth_message(frame, with_visibility=False)
+            if message is not None:
+                self.results.add(message)
+                self._recorder.add(message)
 
     def _tell_truth(self, session: zenoh.Session, until: int) -> None:
         """Publishes and records the truth of frames that are done.

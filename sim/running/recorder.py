@@ -55,12 +55,14 @@ class Recorder:
         self.folder = folder
         self._expected = expected_tracks(scenario)
         self._waiting: dict[int, dict[Track, EstimateMessage]] = {}
+        self._latest: dict[Track, int] = {}
         self._next = 0
+        self._skips = scenario.pace == "realtime"
         try:
             (folder / "logs").mkdir(parents=True, exist_ok=True)
             with suppress(FileNotFoundError):
                 (folder / "summary.json").unlink()
-            dump(scenario.model_dump(mode="json", exclude_none=True), folder / "scenario.yaml")
+            dump(_plain(scenario), folder / "scenario.yaml")
             self._files: dict[str, TextIO] = {
                 name: (folder / f"{name}.jsonl").open("w", encoding="utf-8")
                 for name in ("estimates", "truth", "events")
@@ -85,6 +87,7 @@ class Recorder:
         elif isinstance(message, EstimateMessage):
             track = (message.estimator, message.node)
             self._waiting.setdefault(message.frame, {})[track] = message
+            self._latest[track] = max(message.frame, self._latest.get(track, -1))
             self._write_complete()
 
     def event(self, event: str, node: str, **details: Any) -> None:
@@ -119,9 +122,15 @@ class Recorder:
                 file.close()
 
     def _write_complete(self) -> None:
-        """Writes the next frames of which everything has come."""
-        while self._next in self._waiting and self._expected <= self._waiting[self._next].keys():
-            self._write_frames([self._next])
+        """Writes the next frames of which everything has come, or will not come any more."""
+        while self._waiting and self._is_complete(min(self._waiting)):
+            self._write_frames([min(self._waiting)])
+
+    def _is_complete(self, frame: int) -> bool:
+        if not self._skips:
+            return frame <= self._next and self._expected <= self._waiting[frame].keys()
+        # In real time, a node that has told of a later frame has left this one out.
+        return all(self._latest.get(track, -1) >= frame for track in self._expected)
 
     def _write_frames(self, frames: Iterable[int]) -> None:
         for frame in frames:
@@ -137,6 +146,15 @@ class Recorder:
             file.flush()
         except (OSError, ValueError) as error:
             raise _cannot_write(self.folder, error) from error
+
+
+def _plain(scenario: Scenario) -> dict[str, Any]:
+    """A scenario as plain data; null has a meaning everywhere but in the ways that a camera is not given."""
+    data = scenario.model_dump(mode="json")
+    cameras = [
+        {key: value for key, value in camera.items() if value is not None} for camera in data["cameras"]
+    ]
+    return {**data, "cameras": cameras}
 
 
 def read_run(folder: Path) -> Results:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nodes.calibration import CalibrationError, cropped, read_opencv, read_qualisys, scaled
+from nodes.calibration import CalibrationError, checked_camera, cropped, read_opencv, read_qualisys, scaled
 from nodes.camera import Camera, look_at
 from nodes.sources import SourceError, VideoSource
 from sim.footage import FootageError, locate
@@ -15,17 +15,15 @@ from sim.scenario.document import merge_defaults, read_document
 from sim.scenario.model import CameraOptions, Scenario
 from sim.scenario.parsing import ScenarioError
 from sim.scenario.presets import preset_defaults
+from sim.world.background import require_inside
 
 
-def load_scenario(
-    path: Path, overrides: Iterable[tuple[str, str]] = (), *, name: str | None = None
-) -> Scenario:
+def load_scenario(path: Path, overrides: Iterable[tuple[str, str]] = ()) -> Scenario:
     """Reads a scenario file and resolves it.
 
     Args:
         path: The file.
         overrides: Dotted keys and values, as `--set` gives them; later ones win.
-        name: Another name for the run.
 
     Returns:
         A scenario that does not depend on the presets, on the file's place or on other files' contents: its
@@ -40,12 +38,11 @@ def load_scenario(
     document = merge_defaults(document, preset_defaults(document.data))
     scenario = validate(document, Scenario)
     try:
-        resolved = _resolve(scenario, path.parent)
+        return _resolve(scenario, path.parent)
     except (CalibrationError, FootageError, SourceError) as error:
         raise ScenarioError(f"{path}: {error}") from None
     except ValueError as error:
         raise ScenarioError(f"{path}: {error}") from error
-    return resolved.model_copy(update={"name": name} if name else {})
 
 
 def cameras_of(scenario: Scenario) -> dict[str, Camera]:
@@ -71,6 +68,9 @@ def _resolve(scenario: Scenario, folder: Path) -> Scenario:
     footage = scenario.footage
     if footage is None:
         cameras = {each.name: _calibrated(each, folder, {}) for each in scenario.cameras}
+        if scenario.world is not None:
+            for camera in cameras.values():
+                require_inside(camera, scenario.world.room)
         return scenario.model_copy(update={"cameras": tuple(map(_as_options, cameras.values()))})
     place = locate(footage.name) if footage.name else (folder / str(footage.folder)).resolve()
     listed = read_qualisys(place / footage.calibration) if footage.calibration else {}
@@ -110,7 +110,9 @@ def _matrices(options: CameraOptions) -> Camera:
         position, target = np.array(options.position), np.array(options.look_at)
         return look_at(options.name, position, target, float(options.focal_px or 0), size, distortion)
     K, R, t = np.array(options.K), np.array(options.R), np.array(options.t)
-    return Camera(options.name, size[0], size[1], K, R, t, distortion)
+    return checked_camera(
+        f"camera {options.name}", options.name, [float(n) for n in size], K, R, t, options.distortion
+    )
 
 
 def _as_options(camera: Camera) -> CameraOptions:

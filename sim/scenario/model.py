@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, PositiveInt, model_validator
 
 from network.graph import Edge, Graph, complete, grid, path, ring, star
 from network.keys import check_name
@@ -24,7 +24,7 @@ class CameraOptions(Options):
 
     name: Name
     """Name of the camera and of its node."""
-    size_px: tuple[int, int] | None = None
+    size_px: tuple[PositiveInt, PositiveInt] | None = None
     """Width and height of its pictures."""
     position: Vector3 | None = None
     """Its centre, in m, with `look_at` and `focal_px`."""
@@ -128,7 +128,8 @@ class Scenario(Options):
     name: Name
     """Name of the scenario, and of its runs unless they are given another."""
     preset: PresetName = "robust"
-    """`paper`: the filter as printed; `robust`: the one to use. Fills what the file leaves unsaid."""
+    """`paper`: the paper's features and rules; `robust`: the filter to use. Fills what the file leaves
+    unsaid."""
     frames: int = Field(ge=2, le=1_000_000)
     """Frames of a run; frame 0 is the initialisation."""
     rate_hz: float = Field(gt=0)

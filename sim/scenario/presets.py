@@ -1,4 +1,4 @@
-"""The presets: the paper's filter as printed, and the one that holds where that one loses the target.
+"""The presets: the paper's features and rules, and those that hold where these lose the target.
 
 A preset fills what the scenario file leaves unsaid; what the file says wins.
 """
@@ -20,7 +20,11 @@ PAPER: Mapping[str, Any] = {
     },
     "fusion": {"rule": "eq17", "local_particles": "own", "proposal": "prior"},
 }
-"""Jing & Chen's section 4: 8 bins a channel, ε = 0.325, 12 rounds, the SIR filter, Eq. 17 as printed."""
+"""Jing & Chen's section 4: 8 bins a channel, ε = 0.325, 12 rounds, the SIR filter, Eq. 17 as printed.
+
+What the paper leaves open is as in the other preset: boxes follow from the geometry, and the likelihood has a
+floor (`filter.likelihood.form: literal` takes that away too).
+"""
 
 ROBUST: Mapping[str, Any] = {
     "network": {"consensus": {"algorithm": "metropolis"}, "iterations": 12},

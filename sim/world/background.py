@@ -33,6 +33,20 @@ def lines_of_sight(camera: Camera) -> Float[np.ndarray, "h w 3"]:
     return cv2.resize(rays.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
 
 
+def require_inside(camera: Camera, room: RoomOptions) -> None:
+    """Checks that a camera hangs inside the room.
+
+    Raises:
+        ValueError: It does not.
+    """
+    place = camera.center.tolist()
+    if not (inside(room, camera.center[None, :2]).all() and 0 < place[2] < room.height):
+        raise ValueError(
+            f"camera {camera.name} at {[round(c, 2) for c in place]} is outside the room: "
+            "move it, or give world.room another center, size or height"
+        )
+
+
 def empty_room(camera: Camera, room: RoomOptions, interior: Interior) -> UInt8[np.ndarray, "H W 3"]:
     """The room as a camera sees it in white light.
 
@@ -44,12 +58,8 @@ def empty_room(camera: Camera, room: RoomOptions, interior: Interior) -> UInt8[n
     Raises:
         ValueError: The camera hangs outside the room.
     """
+    require_inside(camera, room)
     x, y, z = camera.center.tolist()
-    if not (inside(room, camera.center[None, :2]).all() and 0 < z < room.height):
-        raise ValueError(
-            f"camera {camera.name} at {[round(c, 2) for c in (x, y, z)]} is outside the room: "
-            "move it, or give world.room another center, size or height"
-        )
     dx, dy, dz = np.ascontiguousarray(np.moveaxis(lines_of_sight(camera), -1, 0))
     reach = distance_to_wall(room, camera.center[:2], dx, dy)
     at_wall_z = z + reach * dz

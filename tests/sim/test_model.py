@@ -85,7 +85,7 @@ def _estimates(scenario):
 
 
 def test_a_run_may_have_a_name_of_its_own(small):
-    assert load_scenario(small, name="other").name == "other"
+    assert load_scenario(small, [("name", "other")]).name == "other"
 
 
 @pytest.mark.parametrize(("cpf", "processes"), [("true", 6), ("false", 5)])
