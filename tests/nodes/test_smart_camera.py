@@ -190,3 +190,14 @@ def test_a_peers_nonsense_is_a_result_and_not_an_exception(room):
             bench.hear("C1", node.on_message(ConsensusMessage(sender, 1, round_, 2, nonsense)))
     assert np.isfinite(bench.estimates[1, "C1", "dcpf"].mean).all()
     assert node.counters["indefinite_fused"] == 1
+
+
+def test_frames_that_were_left_out_move_the_target_all_the_same(room):
+    blind = Bench(room(turned_away=NAMES), with_single=True)
+    for frame in (0, 1, 5):
+        blind.frame(frame)
+    for kind in ("dcpf", "single"):
+        before, after = (blind.estimates[frame, "C1", kind] for frame in (1, 5))
+        # nobody sees anything: four frames of 0.1 s at the velocity of the cloud
+        np.testing.assert_allclose(after.mean[:2] - before.mean[:2], 0.4 * before.mean[2:], atol=0.06)
+        assert np.trace(after.covariance[:2, :2]) > np.trace(before.covariance[:2, :2]) + 3 * 2e-3

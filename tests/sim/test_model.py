@@ -6,11 +6,12 @@ import pytest
 from network.messages import EstimateMessage
 from sim.assembly import Assembly
 from sim.running.in_process import run_in_process
-from sim.scenario.document import dump
+from sim.running.recorder import Recorder
 from sim.scenario.loading import cameras_of, load_scenario
 from sim.scenario.parsing import ScenarioError
 
 IDENTITY = "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]"
+MIRROR = "[[-1, 0, 0], [0, 1, 0], [0, 0, 1]]"
 
 MISTAKES = {
     "two calibrations": ([("cameras.A.K", IDENTITY)], "camera A is calibrated in two ways"),
@@ -22,6 +23,12 @@ MISTAKES = {
     "no calibration": ([("cameras.A", "{name: A}")], "camera A is not calibrated"),
     "no size": ([("cameras.A.size_px", "null")], "camera A needs size_px"),
     "straight down": ([("cameras.A.look_at", "[-5, -2, 0]")], "camera A looks straight up or down"),
+    "outside": ([("cameras.A.position", "[-50, -2, 2.9]")], "camera A at .* is outside the room: move it"),
+    "a mirror": (
+        [("cameras.A", f"{{name: A, size_px: [9, 9], K: {IDENTITY}, R: {MIRROR}, t: [0, 0, 1]}}")],
+        "camera A: R is no rotation",
+    ),
+    "no picture": ([("cameras.A.size_px", "[-3, 0]")], r"cameras\[0\]\.size_px\[0\] must be greater than 0"),
     "two of a name": ([("cameras.B.name", "A")], "cameras has two named A"),
     "the central node's name": ([("central.name", "B")], "central.name is B, as is a camera"),
     "a name that is no key": ([("cameras.A.name", "a/b")], r"cameras\[0\]\.name: 'a/b' cannot name"),
@@ -57,15 +64,23 @@ def test_a_mistake_is_named_with_its_key(small, overrides, sentence):
     with pytest.raises(ScenarioError, match=sentence) as caught:
         load_scenario(small, overrides)
 
-    assert len(str(caught.value).splitlines()) == 1
+    assert len(str(caught.value).splitlines()) == (2 if "size_px[1]" in str(caught.value) else 1)
     assert str(small) in str(caught.value) or "--set" in str(caught.value)
 
 
-def test_what_is_resolved_can_be_read_back(small, tmp_path):
-    resolved = load_scenario(small, [("network.graph", "[[A, B], [B, C], [C, D]]")])
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        [("network.graph", "[[A, B], [B, C], [C, D]]")],
+        [("filter.sampling.grid", "null")],
+        [("preset", "paper")],
+    ],
+)
+def test_what_is_resolved_can_be_read_back(small, tmp_path, overrides):
+    resolved = load_scenario(small, overrides)
 
-    dump(resolved.model_dump(mode="json", exclude_none=True), tmp_path / "resolved.yaml")
-    again = load_scenario(tmp_path / "resolved.yaml")
+    with Recorder(tmp_path, resolved):
+        again = load_scenario(tmp_path / "scenario.yaml")
 
     assert again == resolved
     for name, camera in cameras_of(resolved).items():

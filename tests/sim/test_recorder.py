@@ -48,6 +48,19 @@ def test_everybody_who_will_estimate_is_expected(small):
     assert len(expected_tracks(load_scenario(small))) == 9
 
 
+def test_a_frame_that_a_node_leaves_out_in_real_time_holds_nothing_up(small, tmp_path):
+    scenario = load_scenario(small, [("frames", "4"), ("pace", "realtime")])
+    written = []
+    with Recorder(tmp_path / "run", scenario) as recorder:
+        for frame in range(4):
+            for track in sorted(expected_tracks(scenario)):
+                if (frame, track) != (1, ("dcpf", "B")):
+                    recorder.add(estimate(track, frame))
+            written.append(len((tmp_path / "run" / "estimates.jsonl").read_bytes().splitlines()))
+
+    assert written == [9, 9, 26, 35]
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_the_file_is_the_same_whatever_the_order_of_arrival(scenario, tmp_path, seed):
     messages = all_estimates(scenario)

@@ -4,7 +4,10 @@ import pytest
 
 from nodes.camera import Camera, look_at
 from sim.world.colors import bgr
+from sim.world.figure import figures
 from sim.world.light import LightingOptions, build_light, gain_at
+from sim.world.mesh import views
+from sim.world.people import Pose
 from sim.world.renderer import Renderer
 from sim.world.visibility import visibility
 from sim.world.world import WorldOptions, build_world
@@ -75,6 +78,20 @@ def test_clothes_have_their_colours(position, upper):
     assert np.abs(colors.mean(axis=0) - bgr(upper)).max() < 0.12 * 255
     assert np.abs(colors.mean(axis=0) / bgr(upper) - 1).max() < 0.25
     assert (colors.std(axis=0) < 0.08 * bgr(upper) + 3).all()
+
+
+def test_people_look_the_same_in_a_crowd_as_alone():
+    poses = [
+        Pose(np.array([x, 0.5]), heading, 1.0 + x, 0.8, height, 1.75)
+        for x, heading, height in ((-1.0, 0.3, 1.75), (0.5, 2.5, 1.1), (60.0, 0.0, 1.75))
+    ]
+    palettes = [np.full((5, 3), 60.0 + 40 * i) for i in range(3)]
+    crowd = views(figures(poses, palettes), camera())
+    for together, pose, palette in zip(crowd, poses, palettes, strict=True):
+        (alone,) = views(figures([pose], [palette]), camera())
+        np.testing.assert_allclose(together.polygons, alone.polygons)
+        np.testing.assert_allclose(together.colors, alone.colors)
+        assert together.pictured == alone.pictured == 1.0
 
 
 def test_feet_head_and_width_are_where_the_camera_projects_them():

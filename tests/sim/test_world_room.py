@@ -59,13 +59,13 @@ def test_an_occluder_hides_what_is_behind_it_and_nothing_before_it():
 
 def test_an_occluder_is_a_closed_box_of_its_size():
     box = build_occluder(OccluderOptions(start=(0, 0), end=(2, 0), thickness=0.5, bottom=0.3, top=1.3))
-    corners = box.mesh.vertices[box.mesh.faces]
+    corners = box.solid.vertices[0, box.solid.faces]
     # the corners run clockwise from outside, so the volume by the divergence theorem is negative
     fan = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     fan += np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 0])
     volume = (corners[:, 0] * fan).sum() / 6
     assert volume == pytest.approx(-2.0 * 0.5 * 1.0)
-    assert ((fan / -np.linalg.norm(fan, axis=1, keepdims=True)) - box.mesh.normals).max() < 1e-9
+    assert ((fan / -np.linalg.norm(fan, axis=1, keepdims=True)) - box.solid.normals[0]).max() < 1e-9
 
 
 def test_occluders_without_a_volume_are_refused():
