@@ -82,11 +82,12 @@ class Consensus:
     def receive(self, message: ConsensusMessage) -> tuple[ConsensusMessage, ...]:
         """Takes a neighbour's message; one that is of no use is counted and dropped."""
         sender, position = message.sender, (message.frame, message.round)
-        if sender not in self._heard:
+        last = self._heard.get(sender)
+        if last is None:
             self.counters["stranger"] += 1
-        elif position == self._heard[sender]:
+        elif position == last:
             self.counters["duplicate"] += 1
-        elif position < self._heard[sender]:
+        elif position < last:
             self.counters["old"] += 1
         else:
             self._heard[sender] = position
@@ -97,9 +98,7 @@ class Consensus:
         """The neighbours whose message of this round may still come, sorted by name."""
         if self.done:
             return ()
-        return tuple(
-            name for name in self.neighbors if name not in self._absent and self._heard[name] < self._position
-        )
+        return self._behind(self._position)
 
     def drop(self, neighbor: str) -> tuple[ConsensusMessage, ...]:
         """Goes on without a neighbour from now on; what it has said for this round still counts."""
@@ -122,9 +121,13 @@ class Consensus:
     def _present(self) -> tuple[str, ...]:
         """The neighbours that take part in this frame: neither gone nor already in a later one."""
         frame, _ = self._position
-        return tuple(
-            name for name in self.neighbors if name not in self._absent and self._heard[name] < (frame + 1, 0)
-        )
+        return self._behind((frame + 1, 0))
+
+    def _behind(self, position: _Position) -> tuple[str, ...]:
+        """The neighbours of this frame that have said nothing yet from a position on."""
+        absent = self._absent
+        # a list, not a generator: this runs several times a round
+        return tuple([name for name, last in self._heard.items() if last < position and name not in absent])
 
     def _keep(self, message: ConsensusMessage) -> None:
         """Keeps a message that this round, the next one, or a later frame's first can use."""

@@ -50,6 +50,10 @@ class Camera:
         real = roots[np.isreal(roots)].real
         return float(real[real > 0].min(initial=np.inf))
 
+    @cached_property
+    def _distorts(self) -> bool:
+        return bool(self.distortion.any())
+
     def project(
         self, points: Float[np.ndarray, "N 3"]
     ) -> tuple[Float[np.ndarray, "N 2"], Float[np.ndarray, " N"]]:
@@ -64,11 +68,11 @@ class Camera:
         """
         x, y, depth = self.R @ points.T + self.t[:, None]
         in_front = depth > 1e-6
-        safe = np.where(in_front, depth, 1.0)
+        safe = np.maximum(depth, 1e-6)
         x, y = x / safe, y / safe
         r2 = x * x + y * y
         pictured = in_front & (r2 < self._radius2_limit)
-        if self.distortion.any():
+        if self._distorts:
             k1, k2, p1, p2, k3 = self.distortion
             radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
             x, y = (
@@ -77,7 +81,8 @@ class Camera:
             )
         u = self.K[0, 0] * x + self.K[0, 1] * y + self.K[0, 2]
         v = self.K[1, 1] * y + self.K[1, 2]
-        pixels = np.stack([u, v], axis=1)
+        pixels = np.empty((len(points), 2))
+        pixels[:, 0], pixels[:, 1] = u, v
         pixels[~pictured] = np.nan
         return pixels, depth
 

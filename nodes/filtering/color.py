@@ -15,6 +15,7 @@ from network.options import Options
 
 GAIN_GRID_PX = 24
 """Every 24th pixel of every 24th line is enough for a median."""
+_VALUES = np.arange(256)
 
 
 class ColorOptions(Options):
@@ -71,11 +72,16 @@ def gain_reference(image: UInt8[np.ndarray, "H W 3"]) -> GainReference:
 
 def channel_gain(image: UInt8[np.ndarray, "H W 3"], reference: GainReference) -> Float[np.ndarray, " 3"]:
     """How much brighter each channel is than in the reference: median ratio of well exposed pixels."""
-    now, then = _sparse(image).reshape(-1, 3), reference.pixels.reshape(-1, 3)
-    exposed = ((now > 15) & (now < 250) & (then > 15) & (then < 250)).all(axis=1)
-    if np.count_nonzero(exposed) < 16:
+    # One row a channel: NumPy is quick along the long axis only.
+    now, then = (np.array(pixels.reshape(-1, 3).T) for pixels in (_sparse(image), reference.pixels))
+    exposed = np.flatnonzero(((now > 15) & (now < 250) & (then > 15) & (then < 250)).all(axis=0))
+    n = len(exposed)
+    if n < 16:
         return np.ones(3)
-    return np.median((now[exposed] + 1.0) / (then[exposed] + 1.0), axis=0)
+    ratios = (now.take(exposed, axis=1) + 1.0) / (then.take(exposed, axis=1) + 1.0)
+    # The median, without the checks that make NumPy's own ten times slower for so few.
+    ratios.partition(((n - 1) // 2, n // 2), axis=1)
+    return (ratios[:, (n - 1) // 2] + ratios[:, n // 2]) / 2
 
 
 def _sparse(image: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "h w 3"]:
@@ -98,12 +104,10 @@ def quantize(
     """
     n = options.bins_per_channel
     # bin = floor(n · value / 256), of the value without its gain
-    values = np.arange(256)[:, None] / gain
-    bins = np.minimum(values * n / 256, n - 1).astype(np.uint8)
-    binned = cv2.LUT(image, bins[None])
-    blue, green, red = cv2.split(binned)
-    if options.space == "rgb":
-        return np.stack([red, green, blue])
-    if n**3 <= 256:
-        return (red * np.uint8(n * n) + green * np.uint8(n) + blue)[None]
-    return (red * np.uint16(n * n) + green * np.uint16(n) + blue)[None]
+    values = _VALUES / gain[:, None]
+    dtype = np.uint8 if options.n_bins <= 256 else np.uint16
+    bins = np.minimum(values * n / 256, n - 1).astype(dtype)
+    if options.space == "joint_rgb":
+        bins *= np.array([[1], [n], [n * n]], dtype)
+    blue, green, red = cv2.split(cv2.LUT(image, np.ascontiguousarray(bins.T)[None]))
+    return np.stack([red, green, blue]) if options.space == "rgb" else (red + green + blue)[None]

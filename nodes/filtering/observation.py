@@ -4,6 +4,7 @@ Source: Jing & Chen, Eq. 6-8 and 11-12, on boxes that follow from the camera's g
 camera and one picture lives here; nothing about particles' weights does.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -197,10 +198,12 @@ def covered_region(boxes: Float[np.ndarray, "N 4"], camera: Camera) -> tuple[int
     """left, top, right, bottom of the part of the picture that boxes in it cover; at least one pixel."""
     if not len(boxes):
         return 0, 0, 1, 1
-    size = np.array([camera.width_px, camera.height_px])
-    low = np.clip(np.floor(boxes[:, :2].min(axis=0)), 0, size - 1).astype(int)
-    high = np.clip(np.ceil(boxes[:, 2:].max(axis=0)), low + 1, size).astype(int)
-    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+    lefts, tops, rights, bottoms = boxes.T
+    left = min(max(math.floor(lefts.min()), 0), camera.width_px - 1)
+    top = min(max(math.floor(tops.min()), 0), camera.height_px - 1)
+    right = min(max(math.ceil(rights.max()), left + 1), camera.width_px)
+    bottom = min(max(math.ceil(bottoms.max()), top + 1), camera.height_px)
+    return left, top, right, bottom
 
 
 def surrounding_boxes(box: Float[np.ndarray, " 4"]) -> Float[np.ndarray, "N 4"]:

@@ -11,6 +11,7 @@ from nodes.camera import Camera
 
 MIN_ASPECT = 0.8
 """Least height of a box in widths: what is left of a person seen from straight above."""
+_TRUNK_ASPECT = np.array([1.0, MIN_ASPECT])
 
 
 class StartOptions(Options):
@@ -67,27 +68,31 @@ def project_boxes(
         left, top, right, bottom in pixels, pixel edges at whole numbers; NaN where the target cannot be
         pictured from there, or would be less than two pixels high.
     """
+    n, n_axes = positions.shape
+    body = np.empty((2, n, 3))
+    body[:, :, :n_axes] = positions
+    foot, head = body
     if target.space == "plane":
-        foot = np.column_stack([positions, np.full(len(positions), target.plane_height)])
+        foot[:, 2] = target.plane_height
     else:
-        foot = positions - np.array([0.0, 0.0, target.height / 2])
-    head = foot + np.array([0.0, 0.0, target.height])
-    pixels, depth = camera.project(np.concatenate([foot, head]))
-    ends = pixels.reshape(2, -1, 2) + 0.5
-    middle = ends.mean(axis=0)
+        foot[:, 2] -= target.height / 2
+    head[:, 2] = foot[:, 2] + target.height
+    pixels, depths = camera.project(body.reshape(2 * n, 3))
+    low, high = pixels[:n] + 0.5, pixels[n:] + 0.5
+    middle = (low + high) / 2
     # A slanted or rolled view shortens the body but not its thickness: a box is at least as wide as it,
     # and nearly as high.
-    trunk = 0.5 * camera.K[0, 0] * target.width / np.maximum(depth.reshape(2, -1).mean(axis=0), 1e-6)
-    half = np.maximum(0.5 * np.abs(ends[0] - ends[1]), trunk[:, None] * np.array([1.0, MIN_ASPECT]))
-    boxes = np.concatenate([middle - half, middle + half], axis=1)
+    trunk = 0.5 * camera.K[0, 0] * target.width / np.maximum((depths[:n] + depths[n:]) / 2, 1e-6)
+    half = np.maximum(0.5 * np.abs(low - high), trunk[:, None] * _TRUNK_ASPECT)
+    boxes = np.concatenate((middle - half, middle + half), axis=1)
     boxes[~(half[:, 1] > 1.0)] = np.nan
     return boxes
 
 
 def visible_fraction(boxes: Float[np.ndarray, "N 4"], camera: Camera) -> Float[np.ndarray, " N"]:
     """The part of each box that lies inside the picture, 0 to 1."""
-    size = np.array([camera.width_px, camera.height_px])
-    low, high = boxes[:, :2], boxes[:, 2:]
-    inside = np.clip(np.minimum(high, size) - np.maximum(low, 0.0), 0.0, None)
-    fraction = inside.prod(axis=1) / (high - low).prod(axis=1)
-    return np.where(np.isnan(fraction), 0.0, fraction)
+    left, top, right, bottom = boxes.T
+    inside_x = np.maximum(np.minimum(right, camera.width_px) - np.maximum(left, 0.0), 0.0)
+    inside_y = np.maximum(np.minimum(bottom, camera.height_px) - np.maximum(top, 0.0), 0.0)
+    fraction = inside_x * inside_y / ((right - left) * (bottom - top))
+    return np.fmax(fraction, 0.0)  # of a box that cannot be pictured, NaN, nothing

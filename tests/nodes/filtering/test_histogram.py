@@ -82,7 +82,8 @@ def by_loop(bins, box, book, sampling):
 
 
 @pytest.mark.parametrize("kernel", ["uniform", "epanechnikov"])
-@pytest.mark.parametrize(("n_channels", "n_bins", "parts"), [(1, 27, PARTS), (3, 8, (1.0,)), (3, 4, PARTS)])
+# the first tells apart too many colours for comparing the samples with each, the others few enough
+@pytest.mark.parametrize(("n_channels", "n_bins", "parts"), [(1, 64, PARTS), (3, 8, (1.0,)), (3, 4, PARTS)])
 def test_a_grid_of_samples_agrees_with_a_loop(kernel, n_channels, n_bins, parts):
     rng = np.random.default_rng(1)
     bins = random_bins(rng, n_channels, n_bins)
