@@ -1,34 +1,42 @@
 """The human figure: a mesh of elliptic tubes, posed by heading and gait.
 
+A tube's sides are strips over one or two of its sections, so that a body is drawn in a moment: a strip ends
+where the colour changes or the surface turns, and at the knee.
+
 All lengths are fractions of the stature. Head, torso and legs take 14 %, 38 % and 48 % of the height: the
 chin is at 0.86, the hem at 0.48.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.world.mesh import Mesh
+from sim.world.mesh import Solids
 from sim.world.people import Pose
 
-# Rings of the tubes: height, half width, half depth, and how far the centre lies forwards.
+# Rings of the tubes: height, half width, half depth, and how far the centre lies forwards; and the numbers of
+# the rings, the joints, from one of which to the next the strips lead.
 _HEAD = (
     (0.845, 0.030, 0.034, 0.000), (0.878, 0.034, 0.044, 0.006), (0.912, 0.045, 0.055, 0.009),
     (0.950, 0.047, 0.056, 0.005), (0.982, 0.035, 0.043, 0.002), (1.000, 0.010, 0.012, 0.000),
 )  # fmt: skip
 _TORSO = (
-    (0.475, 0.090, 0.064, 0.000), (0.600, 0.084, 0.059, 0.001), (0.710, 0.097, 0.067, 0.003),
-    (0.805, 0.106, 0.060, 0.001), (0.840, 0.076, 0.046, 0.000), (0.860, 0.034, 0.034, 0.000),
+    (0.475, 0.090, 0.064, 0.000), (0.600, 0.084, 0.059, 0.001), (0.805, 0.106, 0.060, 0.001),
+    (0.840, 0.076, 0.046, 0.000), (0.860, 0.034, 0.034, 0.000),
 )  # fmt: skip
 _ARM = (
-    (0.435, 0.012, 0.018, 0.020), (0.485, 0.018, 0.022, 0.013), (0.640, 0.025, 0.027, -0.006),
-    (0.800, 0.028, 0.033, 0.000), (0.828, 0.012, 0.018, 0.000),
+    (0.435, 0.012, 0.018, 0.020), (0.485, 0.018, 0.022, 0.013), (0.800, 0.028, 0.033, 0.000),
+    (0.828, 0.012, 0.018, 0.000),
 )  # fmt: skip
 _LEG = (
     (0.000, 0.028, 0.064, 0.028), (0.036, 0.029, 0.044, 0.010), (0.270, 0.039, 0.043, 0.000),
-    (0.390, 0.047, 0.053, 0.000), (0.485, 0.046, 0.056, 0.000),
+    (0.485, 0.046, 0.056, 0.000),
 )  # fmt: skip
+_HEAD_JOINTS, _TORSO_JOINTS, _ARM_JOINTS, _LEG_JOINTS = (0, 1, 3, 5), (0, 2, 4), (0, 1, 3), (0, 1, 2, 3)
 _SHOULDER, _HIP, _WRIST, _KNEE, _ANKLE = 0.82, 0.485, 0.48, 0.27, 0.036
 _STEP = 0.19  # a foot swings this far forwards and back
 _REACH = 0.09  # and a hand this far
@@ -59,30 +67,39 @@ class _Body:
     leg: Float[np.ndarray, " V"]
     rise: Float[np.ndarray, " V"]
     bend: Float[np.ndarray, " V"]
-    faces: Int[np.ndarray, "F 4"]
+    faces: Int[np.ndarray, "F 6"]
     normals: Float[np.ndarray, "F 3"]
     paint: Int[np.ndarray, " F"]
     tone: Float[np.ndarray, " F"]
 
 
 def _tube(
-    rings: tuple[tuple[float, float, float, float], ...], n_sides: int, sideways: float
-) -> tuple[Float[np.ndarray, "V 3"], Int[np.ndarray, "F 4"]]:
+    rings: tuple[tuple[float, float, float, float], ...],
+    joints: tuple[int, ...],
+    n_sides: int,
+    sideways: float,
+) -> tuple[Float[np.ndarray, "V 3"], Int[np.ndarray, "F 6"]]:
     """Vertices and faces of a tube."""
     height, half_width, half_depth, forwards = np.array(rings).T[..., None]
     angles = 2 * np.pi * (np.arange(n_sides) + 0.5) / n_sides  # from right to forwards
-    x, y = sideways + half_width * np.cos(angles), forwards + half_depth * np.sin(angles)
-    number = np.arange(height.size * n_sides).reshape(-1, n_sides)
+    widening = np.pi / n_sides / np.sin(np.pi / n_sides)  # as wide on average as the ellipses
+    x = sideways + widening * half_width * np.cos(angles)
+    y = forwards + widening * half_depth * np.sin(angles)
+    vertices = np.stack([x, y, np.broadcast_to(height, x.shape)], axis=-1).reshape(-1, 3)
+    # three rings to each strip, the last repeated if need be: up along one edge, down along the other
+    upwards = np.array([np.minimum(low + np.arange(3), high) for low, high in pairwise(joints)])
+    number = np.arange(len(vertices)).reshape(-1, n_sides)
     after = np.roll(number, -1, axis=1)
-    faces = np.stack([number[:-1], number[1:], after[1:], after[:-1]], axis=-1)
-    return np.stack([x, y, np.broadcast_to(height, x.shape)], axis=-1).reshape(-1, 3), faces.reshape(-1, 4)
+    faces = np.concatenate([number[upwards], after[upwards[:, ::-1]]], axis=1)
+    return vertices, np.moveaxis(faces, 1, 2).reshape(-1, 6)
 
 
 def _build() -> _Body:
     """Joins the tubes, and says how each moves."""
     tubes = [
-        _tube(_HEAD, 6, 0.0), _tube(_TORSO, 8, 0.0),
-        _tube(_ARM, 5, 0.112), _tube(_ARM, 5, -0.112), _tube(_LEG, 5, 0.047), _tube(_LEG, 5, -0.047),
+        _tube(_HEAD, _HEAD_JOINTS, 6, 0.0), _tube(_TORSO, _TORSO_JOINTS, 6, 0.0),
+        _tube(_ARM, _ARM_JOINTS, 4, 0.112), _tube(_ARM, _ARM_JOINTS, 4, -0.112),
+        _tube(_LEG, _LEG_JOINTS, 4, 0.047), _tube(_LEG, _LEG_JOINTS, 4, -0.047),
     ]  # fmt: skip
     rest = np.concatenate([vertices for vertices, _ in tubes])
     counts = [len(vertices) for vertices, _ in tubes]
@@ -95,10 +112,10 @@ def _build() -> _Body:
     below_hip, below_shoulder = (np.maximum(1 - height / joint, 0) for joint in (_HIP, _SHOULDER))
     above_knee = np.abs(height - _KNEE)
     corners = rest[faces]
-    normals = np.cross(corners[:, 3] - corners[:, 1], corners[:, 2] - corners[:, 0])
+    normals = np.cross(corners[:, 5] - corners[:, 2], corners[:, 3] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     paint = _paint(corners[..., 2].mean(axis=1), normals[:, 1], tube[faces[:, 0]])
-    folds = 1 + 0.05 * np.sin(2.4 * np.arange(len(faces)) ** 1.5)
+    folds = 1 + 0.03 * np.sin(2.4 * np.arange(len(faces)) ** 1.5)
     return _Body(
         rest=rest,
         swing=leg * _STEP * below_hip - arm * 2 * _REACH * below_shoulder,
@@ -126,22 +143,31 @@ def _paint(
 _BODY = _build()
 
 
-def figure(pose: Pose, palette: Float[np.ndarray, "5 3"]) -> Mesh:
-    """The body of a person.
+def figures(poses: Sequence[Pose], palettes: Sequence[Float[np.ndarray, "5 3"]]) -> Solids:
+    """The bodies of people.
 
     Args:
-        pose: Where and how they stand.
-        palette: Colours of skin, hair, upper body, trousers and shoes; blue, green, red, 0 to 255.
+        poses: Where and how each of them stands; at least one.
+        palettes: Their colours of skin, hair, upper body, trousers and shoes; blue, green, red, 0 to 255.
     """
-    forwards = (np.cos(pose.heading), np.sin(pose.heading))
-    axes = np.array([[forwards[1], -forwards[0], 0.0], [*forwards, 0.0], [0.0, 0.0, 1.0]])
+    numbers = [(pose.phase, pose.effort, pose.height, pose.stature) for pose in poses]
+    phase, effort, height, stature = np.array(numbers).T[..., None]
+    places = np.array([(*pose.position.tolist(), 0.0) for pose in poses])
+    axes = np.array([_axes(pose.heading) for pose in poses])
     # a leg swings with sin(phase), and is in the air while it swings forwards
-    air = pose.effort * np.maximum(_BODY.leg * np.cos(pose.phase), 0.0)
-    bend = _STRIDE_BEND * air + _CROUCH_BEND * (1 - pose.height / pose.stature)
-    body = _BODY.rest.copy()
-    body[:, 1] += _BODY.swing * (pose.effort * np.sin(pose.phase)) + _BODY.bend * bend
-    body[:, 2] += _BODY.rise * air
-    vertices = body * (pose.stature, pose.stature, pose.height) @ axes
-    vertices[:, :2] += pose.position
-    colors = palette[_BODY.paint] * _BODY.tone[:, None]
-    return Mesh(vertices, _BODY.faces, _BODY.normals @ axes, colors)
+    air = effort * np.maximum(_BODY.leg * np.cos(phase), 0.0)
+    bend = _STRIDE_BEND * air + _CROUCH_BEND * (1 - height / stature)
+    bodies = np.empty((len(poses), *_BODY.rest.shape))
+    bodies[..., 0] = stature * _BODY.rest[:, 0]
+    bodies[..., 1] = stature * (_BODY.rest[:, 1] + effort * np.sin(phase) * _BODY.swing + bend * _BODY.bend)
+    bodies[..., 2] = height * (_BODY.rest[:, 2] + air * _BODY.rise)
+    vertices = bodies @ axes + places[:, None]
+    normals = _BODY.normals @ axes
+    colors = np.array(palettes)[:, _BODY.paint] * _BODY.tone[:, None]
+    return Solids(vertices, _BODY.faces, normals, colors)
+
+
+def _axes(heading: float) -> list[list[float]]:
+    """A body's right, forwards and up in the world."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    return [[sin, -cos, 0.0], [cos, sin, 0.0], [0.0, 0.0, 1.0]]

@@ -73,25 +73,29 @@ class Sensor:
             gain_spread: Standard deviation of the gains among cameras.
             seed: The run's seed.
         """
-        self._camera, self._seed = camera, seed
+        self._camera = camera
         rng = stream(seed, "world", camera.name, "sensor")
         self.gain = 1 + gain_spread * np.clip(rng.standard_normal(3), -3, 3)
         shape = (camera.height_px + _PLAY_PX, camera.width_px + _PLAY_PX, 3)
         field = np.rint(noise * rng.standard_normal(shape, dtype=np.float32))
+        # no two of so many frames show the same part
+        self._corners = rng.permutation((_PLAY_PX + 1) ** 2)
         # two unsigned halves: saturating addition and subtraction are the fastest way to add noise
         self._brighter = np.clip(field, 0, 255).astype(np.uint8)
         self._darker = np.clip(-field, 0, 255).astype(np.uint8)
 
     def read_out(self, exposed: UInt8[np.ndarray, "H W 3"], index: int) -> UInt8[np.ndarray, "H W 3"]:
-        """A picture with the noise of one frame.
+        """Adds the noise of one frame to a picture.
 
         Args:
-            exposed: The picture without noise.
+            exposed: The picture without noise; it is overwritten.
             index: The frame's number.
+
+        Returns:
+            The same picture with noise.
         """
-        rng = stream(self._seed, "world", self._camera.name, "frame", str(index))
-        x, y = rng.integers(0, _PLAY_PX, 2, endpoint=True).tolist()
+        y, x = divmod(int(self._corners[index % len(self._corners)]), _PLAY_PX + 1)
         part = np.s_[y : y + self._camera.height_px, x : x + self._camera.width_px]
-        return cv2.subtract(cv2.add(exposed, self._brighter[part]), self._darker[part]).astype(
-            np.uint8, copy=False
-        )
+        cv2.add(exposed, self._brighter[part], dst=exposed)
+        cv2.subtract(exposed, self._darker[part], dst=exposed)
+        return exposed

@@ -1,8 +1,8 @@
-"""Solid things as meshes of four-sided faces, and what a camera sees of them."""
+"""Solid things, made of narrow faces, and what a camera sees of them."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -14,40 +14,28 @@ _NEAREST_M = 0.1  # faces closer than this to a camera's plane are not drawn
 _FARTHEST_PX = 20_000.0  # nor are those that end farther than this from the picture's corner
 _LAMP = np.array([0.38, -0.27, 0.88])  # direction to the lamp
 _SHIFT = 4  # binary digits of a pixel in polygon corners
-_FINE = 2  # pictures of meshes are drawn this much finer, then reduced: that smooths their edges
+_FINE = 2  # solids are drawn this much finer, then reduced: that smooths their edges
 
 Box = tuple[int, int, int, int]
 """Left, top, right and bottom in pixels; right and bottom are excluded."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mesh:
-    """A closed surface.
+class Solids:
+    """Closed surfaces that are alike: each has its own vertices, and all have the same faces between them.
 
     Attributes:
         vertices: Corners in the world, metres.
-        faces: The corners of every face; they run clockwise when seen from outside.
+        faces: The corners of every face, half of them up one edge and half down the other; they run clockwise
+            when seen from outside.
         normals: Outward unit vectors of the faces.
         colors: Colours of the faces in white light; blue, green, red, 0 to 255.
     """
 
-    vertices: Float[np.ndarray, "V 3"]
-    faces: Int[np.ndarray, "F 4"]
-    normals: Float[np.ndarray, "F 3"]
-    colors: Float[np.ndarray, "F 3"]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Layer:
-    """Polygons to draw, the first one lowest; each replaces what it covers.
-
-    Attributes:
-        polygons: Their corners in pixels; convex.
-        colors: Blue, green and red times coverage, then coverage, 0 to 255.
-    """
-
-    polygons: Float[np.ndarray, "F n 2"]
-    colors: Float[np.ndarray, "F 4"]
+    vertices: Float[np.ndarray, "M V 3"]
+    faces: Int[np.ndarray, "F n"]
+    normals: Float[np.ndarray, "M F 3"]
+    colors: Float[np.ndarray, "M F 3"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,13 +48,9 @@ class View:
         pictured: The fraction of the faces that the lens pictures at all, inside the picture or beyond.
     """
 
-    polygons: Float[np.ndarray, "F 4 2"]
+    polygons: Float[np.ndarray, "F n 2"]
     colors: Float[np.ndarray, "F 3"]
     pictured: float
-
-    def under(self, gain: Float[np.ndarray, " 3"]) -> Layer:
-        """Its polygons, opaque, with what light and lens do to blue, green and red."""
-        return Layer(self.polygons, np.column_stack([gain * self.colors, np.full(len(self.colors), 255.0)]))
 
     @property
     def box(self) -> Box:
@@ -74,94 +58,107 @@ class View:
         return box_around(self.polygons)
 
 
-def views(meshes: Sequence[Mesh], camera: Camera) -> list[View]:
-    """Projects and shades the faces of meshes that are turned towards a camera."""
-    if not meshes:
-        return []
-    # all at once: the meshes are small, and calls cost more than numbers
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    vertices = np.concatenate([mesh.vertices for mesh in meshes])
-    faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)])
-    owners = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
-    pixels, depths = camera.project(vertices)
-    x, y = pixels.T
+def views(solids: Solids, camera: Camera) -> list[View]:
+    """Projects and shades the faces that are turned towards a camera, for each of some solids."""
+    # all at once: solids are small, and calls cost more than numbers
+    n_solids, n_vertices, _ = solids.vertices.shape
+    pixels, depths = camera.project(solids.vertices.reshape(-1, 3))
+    x, y = np.ascontiguousarray(pixels.T)
     usable = (depths > _NEAREST_M) & (np.abs(x) < _FARTHEST_PX) & (np.abs(y) < _FARTHEST_PX)
-    a, b, c, d = faces.T
-    pictured = usable[a] & usable[b] & usable[c] & usable[d]
-    # a face is seen from outside when its corners run clockwise on the picture
-    clockwise = (x[c] - x[a]) * (y[d] - y[b]) > (y[c] - y[a]) * (x[d] - x[b])
-    seen = np.flatnonzero(pictured & clockwise)
-    seen = seen[np.lexsort((-(depths[a] + depths[c])[seen], owners[seen]))]
-    colors = _shaded(meshes, vertices[starts[:-1]], camera)[seen]
-    polygons = pixels.take(faces[seen], axis=0)
-    parts = np.split(np.arange(len(seen)), np.searchsorted(owners[seen], np.arange(1, len(meshes))))
-    fractions = np.bincount(owners, pictured) / np.bincount(owners)
+    corners = solids.faces.T[:, None] + n_vertices * np.arange(n_solids)[:, None]  # n, M, F
+    pictured = usable[corners].all(axis=0)
+    # a face is seen from outside when the ends of its edges run clockwise on the picture
+    half = len(corners) // 2
+    a, b, c, d = corners[0], corners[half - 1], corners[half], corners[-1]
+    seen = pictured & ((x[c] - x[a]) * (y[d] - y[b]) > (y[c] - y[a]) * (x[d] - x[b]))
+    # far faces first
+    owners, numbers = np.nonzero(seen)
+    nearness = -(depths[a] + depths[c])[seen]
+    order = np.lexsort((nearness, owners))
+    owners, numbers = owners[order], numbers[order]
+    polygons = pixels.take(corners[:, owners, numbers].T, axis=0)
+    colors = _shaded(solids, owners, numbers, camera)
+    ends = np.searchsorted(owners, np.arange(n_solids + 1)).tolist()
     return [
-        View(polygons[part], colors[part], fraction)
-        for part, fraction in zip(parts, fractions.tolist(), strict=True)
+        View(polygons[start:end], colors[start:end], fraction)
+        for (start, end), fraction in zip(pairwise(ends), pictured.mean(axis=1).tolist(), strict=True)
     ]
 
 
 def _shaded(
-    meshes: Sequence[Mesh], places: Float[np.ndarray, "M 3"], camera: Camera
-) -> Float[np.ndarray, "F 3"]:
-    """Colours of all faces of meshes at some places, as they look to a camera."""
+    solids: Solids, owners: Int[np.ndarray, " S"], numbers: Int[np.ndarray, " S"], camera: Camera
+) -> Float[np.ndarray, "S 3"]:
+    """Colours of some of the solids' faces, as they look to a camera."""
     # Lambert's law for a lamp, light from all sides, and a little more where the surface faces the viewer
-    to_camera = camera.center - places
-    to_camera /= np.linalg.norm(to_camera, axis=1, keepdims=True)
-    shades = [
-        0.70 + mesh.normals @ (0.24 * _LAMP + 0.30 * direction)
-        for mesh, direction in zip(meshes, to_camera, strict=True)
-    ]
-    return np.concatenate([mesh.colors for mesh in meshes]) * np.concatenate(shades)[:, None]
+    to_camera = camera.center - solids.vertices[:, 0]
+    to_camera /= np.sqrt((to_camera**2).sum(axis=1))[:, None]
+    shades = 0.70 + solids.normals @ (0.24 * _LAMP + 0.30 * to_camera)[..., None]
+    return (solids.colors * shades)[owners, numbers]
 
 
-def sprite(layers: Sequence[Layer], box: Box) -> UInt8[np.ndarray, "H W 4"]:
-    """A picture of layers, the first one lowest: blue, green and red times coverage, then coverage."""
-    left, top, right, bottom = box
-    fine = np.zeros((_FINE * (bottom - top), _FINE * (right - left), 4), np.uint8)
-    for layer in layers:
-        _fill(fine, layer.polygons, np.minimum(layer.colors, 255).tolist(), (left, top), float(_FINE))
-    return cv2.resize(fine, (right - left, bottom - top), interpolation=cv2.INTER_AREA)
+def draw(
+    picture: UInt8[np.ndarray, "H W 3"], seen: View, origin: tuple[int, int], gain: Float[np.ndarray, " 3"]
+) -> None:
+    """Draws a solid into a part of a picture.
+
+    Args:
+        picture: The part; it is overwritten.
+        seen: What the camera sees of the solid.
+        origin: Left and top of the part in the whole picture, pixels.
+        gain: What light and lens do to blue, green and red.
+    """
+    height, width, _ = picture.shape
+    fine = cv2.resize(picture, (_FINE * width, _FINE * height), interpolation=cv2.INTER_NEAREST)
+    fill(fine, seen.polygons, (gain * seen.colors).tolist(), origin, float(_FINE))
+    cv2.resize(fine, (width, height), dst=picture, interpolation=cv2.INTER_AREA)
+
+
+def coverage(seen: View, box: Box) -> UInt8[np.ndarray, "H W"]:
+    """How far a solid covers the pixels of a box, 0 to 255."""
+    size = (box[2] - box[0], box[3] - box[1])
+    return cv2.resize(silhouette(seen, box, float(_FINE)), size, interpolation=cv2.INTER_AREA).astype(
+        np.uint8, copy=False
+    )
 
 
 def silhouette(seen: View, box: Box, scale: float) -> UInt8[np.ndarray, "h w"]:
     """Where a mesh covers a box, at a scale: 255 on the mesh, 0 beside it."""
     left, top, right, bottom = box
     mask = np.zeros((max(1, round(scale * (bottom - top))), max(1, round(scale * (right - left)))), np.uint8)
-    _fill(mask, seen.polygons, [[255.0]] * len(seen.polygons), (left, top), scale)
+    fill(mask, seen.polygons, [[255.0]] * len(seen.polygons), (left, top), scale)
     return mask
 
 
-def _fill(
+def fill(
     canvas: UInt8[np.ndarray, "..."],
     polygons: Float[np.ndarray, "F n 2"],
     colors: Sequence[Sequence[float]],
     origin: tuple[int, int],
     scale: float,
 ) -> None:
-    """Draws polygons into a canvas that shows the picture from an origin on, at a scale."""
-    # pixel 0's centre is at 0 and its edge at -1/2, at every scale
-    corners = (polygons - np.array(origin) + 0.5) * scale - 0.5
-    fixed = np.rint(corners * (1 << _SHIFT)).astype(np.int32)
-    for corner, color in zip(list(fixed), colors, strict=True):
-        cv2.fillConvexPoly(canvas, corner, color, cv2.LINE_8, _SHIFT)
+    """Fills polygons of a canvas, each over those before it.
 
-
-def lay_over(
-    picture: UInt8[np.ndarray, "H W 3"], layer: UInt8[np.ndarray, "H W 4"]
-) -> UInt8[np.ndarray, "H W 3"]:
-    """A layer over a picture: picture (1 - coverage) + layer."""
-    uncovered = cv2.cvtColor(255 - layer[..., 3], cv2.COLOR_GRAY2BGR)
-    return cv2.add(cv2.multiply(picture, uncovered, scale=1 / 255), cv2.cvtColor(layer, cv2.COLOR_BGRA2BGR))
+    Args:
+        canvas: What to draw into.
+        polygons: Their corners in the picture, pixels; a row of pixels crosses each of them once at most.
+        colors: Their colours: as many numbers as the canvas has channels.
+        origin: Where the canvas starts in the picture, pixels.
+        scale: The canvas' pixels for every pixel of the picture.
+    """
+    # pixel 0's centre is at 0 and its edge at -1/2, at every scale: (polygons - origin + 1/2) scale - 1/2
+    unit = 1 << _SHIFT
+    shift = [unit * ((0.5 - start) * scale - 0.5) for start in origin]
+    fixed = np.rint(polygons * (unit * scale) + shift).astype(np.int32)
+    for corners, color in zip(list(fixed), colors, strict=True):
+        cv2.fillConvexPoly(canvas, corners, color, cv2.LINE_8, _SHIFT)
 
 
 def box_around(polygons: Float[np.ndarray, "F n 2"]) -> Box:
     """The smallest box that holds some polygons; empty if there are none."""
     if not len(polygons):
         return 0, 0, 0, 0
-    x, y = polygons.reshape(-1, 2).T
-    return math.floor(x.min()), math.floor(y.min()), math.ceil(x.max()) + 1, math.ceil(y.max()) + 1
+    left, top, width, height = cv2.boundingRect(polygons.reshape(-1, 2).astype(np.float32))
+    return left, top, left + width + 1, top + height + 1
 
 
 def union(a: Box, b: Box) -> Box:

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from network.options import Options
 from sim.world.colors import Color, bgr
-from sim.world.mesh import Mesh
+from sim.world.mesh import Solids
 
 _CELL_M = 0.25  # faces are divided this finely: a lens bends them, and they may pass beside a camera
 
@@ -50,14 +50,14 @@ class Occluder:
         outward: The directions of its sides, from the first two corners on.
         reach: How far its sides are from the origin along them, metres.
         on_floor: Whether it stands on the floor.
-        mesh: Its surface.
+        solid: Its surface.
     """
 
     footprint: Float[np.ndarray, "4 2"]
     outward: Float[np.ndarray, "4 2"]
     reach: Float[np.ndarray, " 4"]
     on_floor: bool
-    mesh: Mesh
+    solid: Solids
 
     @property
     def center(self) -> Float[np.ndarray, " 2"]:
@@ -97,14 +97,14 @@ def build_occluder(options: OccluderOptions) -> Occluder:
         outward=outward,
         reach=(outward * footprint).sum(axis=1),
         on_floor=options.bottom == 0,
-        mesh=_mesh([*sides, lid, underside], bgr(options.color)),
+        solid=_solid([*sides, lid, underside], bgr(options.color)),
     )
 
 
-def _mesh(
+def _solid(
     rectangles: list[tuple[np.ndarray, np.ndarray, np.ndarray]], color: Float[np.ndarray, " 3"]
-) -> Mesh:
-    """A mesh of rectangles, each a corner and two edges: right and up when seen from outside."""
+) -> Solids:
+    """A solid of rectangles, each a corner and two edges: right and up when seen from outside."""
     vertices, faces, normals = [], [], []
     n_vertices = 0
     for corner, right, up in rectangles:
@@ -120,4 +120,5 @@ def _mesh(
     joined, corners = np.concatenate(vertices), np.concatenate(faces)
     # less light reaches the lowest half metre
     shade = 0.85 + 0.15 * np.clip(joined[corners, 2].mean(axis=1) / 0.5, 0, 1)
-    return Mesh(joined, corners, np.concatenate(normals), color * shade[:, None])
+    colors = color * shade[:, None]
+    return Solids(joined[None], corners, np.concatenate(normals)[None], colors[None])

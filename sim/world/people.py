@@ -1,5 +1,6 @@
 """People: where they are, which way they face and how their legs move, at any time."""
 
+import math
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -132,7 +133,7 @@ class Person:
     def pose_at(self, time_s: float) -> Pose:
         """How the person stands or walks."""
         distance = float(np.interp(time_s, self.track_s, self.distances))
-        speed = float(np.linalg.norm(self.path.derivative_at(time_s)))
+        speed = math.hypot(*self.path.derivative_at(time_s).tolist())
         return Pose(
             position=self.position_at(time_s),
             heading=float(np.interp(time_s, self.track_s, self.headings)),

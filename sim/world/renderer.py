@@ -4,6 +4,8 @@ What does not move (the room, the occluders) is drawn once. People are then laid
 cut out where an occluder in front of them hides them; the sensor's noise comes last.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -12,15 +14,17 @@ from jaxtyping import Float, UInt8
 
 from nodes.camera import Camera
 from sim.world.background import empty_room
-from sim.world.figure import figure
+from sim.world.figure import figures
 from sim.world.light import Sensor, gain_at
-from sim.world.mesh import Box, Layer, View, box_around, clip, is_empty, lay_over, sprite, union, views
+from sim.world.mesh import Box, View, clip, coverage, draw, is_empty, union, views
 from sim.world.occluders import Occluder
-from sim.world.shadow import shadows
+from sim.world.people import Pose
+from sim.world.shadow import Shadow, shadows
 from sim.world.world import World
 
 Picture = UInt8[np.ndarray, "H W 3"]
 _FALLOFF = 0.16  # a lens gives this much less light in the picture's corners
+_ALL = 255  # coverage of a pixel that is wholly covered
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,14 +71,19 @@ class Renderer:
         """
         gain = gain_at(self._world.light, time_s) * self._sensor.gain
         picture = self._lit_scene(gain).copy()
-        viewer = self._camera.center[:2]
-        people = [(person, person.pose_at(time_s)) for person in self._world.people]
-        people.sort(key=lambda each: -float(np.linalg.norm(each[1].position - viewer)))
-        poses = [pose for _, pose in people]
-        bodies = views([figure(pose, person.palette) for person, pose in people], self._camera)
-        for pose, body, shadow in zip(poses, bodies, shadows(poses, self._camera), strict=True):
-            self._draw_person(picture, pose.position, body, shadow, gain)
+        people = self._world.people
+        if people:
+            poses = [person.pose_at(time_s) for person in people]
+            bodies = views(figures(poses, [person.palette for person in people]), self._camera)
+            darker = shadows(poses, self._camera)
+            for i in self._far_to_near(poses):
+                self._draw_person(picture, poses[i].position, bodies[i], darker[i], gain)
         return self._sensor.read_out(picture, index)
+
+    def _far_to_near(self, poses: Sequence[Pose]) -> list[int]:
+        """The order in which people are drawn."""
+        viewer = self._camera.center[:2].tolist()
+        return sorted(range(len(poses)), key=lambda i: -math.dist(poses[i].position.tolist(), viewer))
 
     def _lit_scene(self, gain: Float[np.ndarray, " 3"]) -> Picture:
         """What does not move, under a light; kept as long as the light stays the same."""
@@ -89,14 +98,12 @@ class Renderer:
         for occluder in sorted(
             self._world.occluders, key=lambda o: -float(np.linalg.norm(o.center - viewer))
         ):
-            (seen,) = views([occluder.mesh], self._camera)
+            (seen,) = views(occluder.solid, self._camera)
             box = clip(seen.box, self._limits)
             if is_empty(box):
                 continue
-            layer = sprite([seen.under(np.ones(3))], box)
-            part = _part(scene, box)
-            part[...] = lay_over(part, layer)
-            covers.append(_Cover(occluder, box, layer[..., 3]))
+            draw(_part(scene, box), seen, box[:2], np.ones(3))
+            covers.append(_Cover(occluder, box, coverage(seen, box)))
         return covers
 
     def _draw_person(
@@ -104,20 +111,31 @@ class Renderer:
         picture: Picture,
         point: Float[np.ndarray, " 2"],
         body: View,
-        shadow: Layer,
+        shadow: Shadow,
         gain: Float[np.ndarray, " 3"],
     ) -> None:
-        """Lays a person over a picture, except where something in front hides them."""
-        box = clip(union(body.box, box_around(shadow.polygons)), self._limits)
+        """Lays a person into a picture, except where something in front hides them."""
+        body_box, shadow_box = clip(body.box, self._limits), clip(shadow.box, self._limits)
+        box = union(body_box, shadow_box)
         if is_empty(box):
             return
-        middle = self._falloff[(box[1] + box[3]) // 2, (box[0] + box[2]) // 2]
-        layer = sprite([shadow, body.under(gain * middle)], box)
         hidden = self._hidden(point, box)
-        if hidden is not None:
-            layer = cv2.multiply(layer, cv2.merge([255 - hidden] * 4), scale=1 / 255)
+        if hidden is not None and hidden.min() == _ALL:
+            return
         part = _part(picture, box)
-        part[...] = lay_over(part, layer)
+        before = part if hidden is None else part.copy()
+        if not is_empty(shadow_box):
+            shadow.darken(_part(picture, shadow_box), shadow_box[:2])
+        if not is_empty(body_box):
+            left, top, right, bottom = body_box
+            middle = self._falloff[(top + bottom) // 2, (left + right) // 2]
+            draw(_part(picture, body_box), body, (left, top), gain * middle)
+        if hidden is not None:
+            # before · hidden + part · (1 - hidden)
+            kept = cv2.multiply(before, cv2.cvtColor(hidden, cv2.COLOR_GRAY2BGR), scale=1 / _ALL)
+            shown = cv2.cvtColor(_ALL - hidden, cv2.COLOR_GRAY2BGR)
+            cv2.multiply(part, shown, dst=part, scale=1 / _ALL)
+            cv2.add(part, kept, dst=part)
 
     def _hidden(self, point: Float[np.ndarray, " 2"], box: Box) -> UInt8[np.ndarray, "H W"] | None:
         """How far occluders in front of a point of the floor cover a box, 0 to 255; None if none does."""

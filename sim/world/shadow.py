@@ -1,33 +1,57 @@
 """The soft shadow on the floor below a person."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
+import cv2
 import numpy as np
+from jaxtyping import Float, UInt8
 
 from nodes.camera import Camera
-from sim.world.mesh import Layer
+from sim.world.mesh import Box, box_around, fill
 from sim.world.people import Pose
 
 _RADIUS = 0.30  # the floor is darker this far around, as a fraction of the stature
 _ANGLES = np.linspace(0, 2 * np.pi, 12, endpoint=False)
 _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), np.zeros(len(_ANGLES))], axis=1)
 _NEAREST_M = 0.1
-_STEPS = np.linspace(1.0, 0.18, 6)  # one disc on another, each smaller and darker
+_STEPS = np.linspace(1.0, 0.18, 5)  # one disc on another, each smaller and darker
 _DARKNESS = 0.34 * np.exp(-((_STEPS / 0.55) ** 2)) + 0.28 * np.exp(-((_STEPS / 0.22) ** 2))
-_COLORS = np.column_stack([np.zeros((len(_STEPS), 3)), 255 * _DARKNESS])
+_LIGHT = (255 * (1 - _DARKNESS[:, None])).tolist()
 
 
-def shadows(poses: Sequence[Pose], camera: Camera) -> list[Layer]:
-    """The shadow of each person, darkest between the feet; none where the lens cannot picture it whole."""
-    if not poses:
-        return []
-    spots = np.array([[*pose.position, 0.0] for pose in poses])
+@dataclass(frozen=True, slots=True, eq=False)
+class Shadow:
+    """A shadow on a camera's picture.
+
+    Attributes:
+        polygons: Corners of its discs in pixels, the widest first; none if the lens cannot picture it whole.
+    """
+
+    polygons: Float[np.ndarray, "n 12 2"]
+
+    @property
+    def box(self) -> Box:
+        """The pixels that it touches."""
+        return box_around(self.polygons)
+
+    def darken(self, picture: UInt8[np.ndarray, "H W 3"], origin: tuple[int, int]) -> None:
+        """Draws it into a part of a picture, whose left and top in the whole picture are given."""
+        light = np.full(picture.shape[:2], 255, np.uint8)
+        fill(light, self.polygons, _LIGHT, origin, 1.0)
+        cv2.multiply(picture, cv2.cvtColor(light, cv2.COLOR_GRAY2BGR), dst=picture, scale=1 / 255)
+
+
+def shadows(poses: Sequence[Pose], camera: Camera) -> list[Shadow]:
+    """The shadow of each person, darkest between the feet; there is at least one."""
+    spots = np.array([(*pose.position.tolist(), 0.0) for pose in poses])
     radii = _RADIUS * np.array([pose.stature for pose in poses])
     points = spots[:, None] + radii[:, None, None] * _CIRCLE
     pixels, depths = camera.project(points.reshape(-1, 3))
-    rims = pixels.reshape(len(poses), -1, 2)
-    whole = (depths.reshape(len(poses), -1) > _NEAREST_M).all(axis=1) & np.isfinite(rims).all(axis=(1, 2))
-    centers = rims.mean(axis=1)[:, None]
-    discs = (centers + step * (rims - centers) for step in _STEPS[:, None, None, None])
-    polygons = np.stack(list(discs), axis=1)
-    return [Layer(each[:n], _COLORS[:n]) for each, n in zip(polygons, whole * len(_STEPS), strict=True)]
+    rims = pixels.reshape(len(poses), len(_CIRCLE), 2)
+    nearest, centers = depths.reshape(len(poses), -1).min(axis=1), rims.mean(axis=1)
+    # what the lens cannot picture is NaN, and so is any mean over it
+    whole = (nearest > _NEAREST_M) & np.isfinite(centers[:, 0])
+    centers = centers[:, None]
+    discs = centers[:, None] + _STEPS[:, None, None] * (rims - centers)[:, None]
+    return [Shadow(each[: len(_STEPS) * shown]) for each, shown in zip(discs, whole.tolist(), strict=True)]

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from nodes.camera import Camera
-from sim.world.figure import figure
+from sim.world.figure import figures
 from sim.world.mesh import View, clip, is_empty, silhouette, views
 from sim.world.world import World
 
@@ -39,7 +39,7 @@ def visibility(world: World, camera: Camera, name: str, time_s: float) -> Visibi
         ValueError: Nobody in the world is called so.
     """
     person = world.person(name)
-    (seen,) = views([figure(person.pose_at(time_s), person.palette)], camera)
+    (seen,) = views(figures([person.pose_at(time_s)], [person.palette]), camera)
     box = seen.box
     shown = clip(box, (0, 0, camera.width_px, camera.height_px))
     if is_empty(shown):
@@ -62,10 +62,18 @@ def _in_front(world: World, camera: Camera, name: str, time_s: float) -> list[Vi
     """Everything that is drawn over a person."""
     viewer = camera.center[:2]
     position = world.position(name, time_s)
-    meshes = [o.mesh for o in world.occluders if o.may_hide(position, viewer)]
-    for other in world.people:
-        pose = other.pose_at(time_s)
-        nearer = np.linalg.norm(pose.position - viewer) < np.linalg.norm(position - viewer)
-        if other.name != name and nearer:
-            meshes.append(figure(pose, other.palette))
-    return views(meshes, camera)
+    distance = np.linalg.norm(position - viewer)
+    occluders = [
+        view
+        for occluder in world.occluders
+        if occluder.may_hide(position, viewer)
+        for view in views(occluder.solid, camera)
+    ]
+    others = [(other.pose_at(time_s), other.palette) for other in world.people if other.name != name]
+    nearer = [
+        (pose, palette) for pose, palette in others if np.linalg.norm(pose.position - viewer) < distance
+    ]
+    if not nearer:
+        return occluders
+    bodies = figures([pose for pose, _ in nearer], [palette for _, palette in nearer])
+    return occluders + views(bodies, camera)
