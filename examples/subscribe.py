@@ -15,4 +15,5 @@ with zenoh.open(config) as session, session.declare_subscriber("dcpf/*/*/estimat
     for sample in subscriber:
         estimate = json.loads(sample.payload.to_string())
         x, y = estimate["mean"][:2]
-        print(f"{estimate['frame']:4d}  {estimate['estimator']:6s} {estimate['node']:8s} {x:7.3f} {y:7.3f} m")
+        who = f"{estimate['frame']:4d}  {estimate['estimator']:6s} {estimate['node']:8s}"
+        print(f"{who} {x:7.3f} {y:7.3f} m", flush=True)

@@ -13,9 +13,6 @@ import zenoh
 
 from network.errors import NetworkError
 
-RUNTIME_ENVIRONMENT = {"ZENOH_RUNTIME": "(rx: (worker_threads: 1))"}
-"""For a node's environment, set before it starts: one thread is enough to receive, and saves CPU."""
-
 _LEASE_MS = 1000
 _WAIT_BEFORE_CLOSE_US = 200_000  # shorter than the lease, or a stalled link stays dead after reconnection
 _CLOSE_S = 5.0

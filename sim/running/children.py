@@ -1,21 +1,21 @@
 """The launcher's side of a run's processes: it starts their host, hears of them, and ends them all."""
 
 import json
-import os
 import queue
 import shutil
 import subprocess
-import sys
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from network.errors import NetworkError
-from network.sessions import RUNTIME_ENVIRONMENT
+from sim.running.head_start import take_host
 
 LEAVE_S = 8.0
 """How long the host has for ending everybody before it is ended itself."""
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+USERS_FAULT = 2
+"""Exit code of a host that could not have its endpoint."""
 
 
 class RunFailed(Exception):  # noqa: N818 - what it says is that the run failed
@@ -23,11 +23,7 @@ class RunFailed(Exception):  # noqa: N818 - what it says is that the run failed
 
 
 class Children:
-    """The processes of a run. None is left when it is closed.
-
-    Attributes:
-        pids: The process of each node.
-    """
+    """The processes of a run. None is left when it is closed."""
 
     def __init__(self, scenario: Path, logs: Path, sockets: Path, by_hand: Sequence[str]) -> None:
         """Starts them and waits until the router listens.
@@ -44,20 +40,16 @@ class Children:
         """
         self._logs, self._sockets = logs, sockets
         self._told: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
-        options = ["--logs", str(logs), "--sockets", str(sockets)]
-        options += [option for name in by_hand for option in ("--by-hand", name)]
-        with (logs / "host.log").open("wb") as log:
-            self._host = subprocess.Popen(
-                [sys.executable, "-m", "sim.running.host", str(scenario), *options],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=log,
-                env=os.environ | RUNTIME_ENVIRONMENT | ONE_THREAD,
-                # Ctrl-C in the terminal is the launcher's business.
-                start_new_session=True,
-            )
+        self._host = take_host()
+        order = {
+            "scenario": str(scenario),
+            "logs": str(logs),
+            "sockets": str(sockets),
+            "by_hand": list(by_hand),
+        }
+        self._order(json.dumps(order).encode() + b"\n")
         try:
-            self.pids = self._started()
+            self._await_start()
         except BaseException:
             self.close()
             raise
@@ -89,7 +81,8 @@ class Children:
     def close(self) -> None:
         """Ends them all: by hanging up, and if that does not help, by force."""
         if self._host.stdin is not None:
-            self._host.stdin.close()
+            with suppress(BrokenPipeError):
+                self._host.stdin.close()
         try:
             self._host.wait(LEAVE_S)
         except subprocess.TimeoutExpired:
@@ -98,16 +91,22 @@ class Children:
             self._host.wait()
         shutil.rmtree(self._sockets, ignore_errors=True)
 
-    def _started(self) -> dict[str, int]:
-        line = self._host.stdout.readline() if self._host.stdout else b""
-        if line:
-            pids: dict[str, int] = json.loads(line)["started"]
-            return pids
-        if self._host.wait() == 2:
-            raise NetworkError(
-                f"{self.last_words('host')}; another endpoint: --set network.router=tcp/127.0.0.1:7500"
-            )
-        raise RunFailed(f"the host of the run's processes could not start: {self.last_words('host')}")
+    def _order(self, line: bytes) -> None:
+        # A host that is gone already is found so by whoever waits for its answer.
+        with suppress(BrokenPipeError):
+            if self._host.stdin is not None:
+                self._host.stdin.write(line)
+                self._host.stdin.flush()
+
+    def _await_start(self) -> None:
+        if self._host.stdout is not None and self._host.stdout.readline():
+            return
+        if self._host.wait() == USERS_FAULT:
+            port = "another endpoint: --set network.router=tcp/127.0.0.1:7500"
+            raise NetworkError(f"{self.last_words('host')}; {port}")
+        early = self._host.stderr.read().decode(errors="replace").strip() if self._host.stderr else ""
+        words = early.splitlines()[-1] if early else self.last_words("host")
+        raise RunFailed(f"the host of the run's processes could not start: {words}")
 
     def _listen(self) -> None:
         for line in self._host.stdout or ():

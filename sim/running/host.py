@@ -8,7 +8,6 @@ Everybody leaves when the one before does, however it ends: the host when its st
 host's pipe does. The host also owns the folder of the run's sockets.
 """
 
-import argparse
 import json
 import logging
 import os
@@ -18,7 +17,6 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -39,25 +37,28 @@ POLL_S = 0.02
 _log = logging.getLogger(__name__)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The launcher's child: tells on stdout, a line of JSON each, who has started and who has ended."""
-    parser = argparse.ArgumentParser(prog="python -m sim.running.host")
-    parser.add_argument("scenario", type=Path)
-    parser.add_argument("--logs", type=Path, required=True)
-    parser.add_argument("--sockets", type=Path, required=True)
-    parser.add_argument("--by-hand", action="append", default=[])
-    parsed = parser.parse_args(arguments)
+def main() -> int:
+    """The launcher's child: takes its order at stdin, tells on stdout who has started and who has ended."""
     # The launcher says when to leave; Ctrl-C in a terminal reaches everybody.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    said = b""
+    while not said.endswith(b"\n"):
+        more = os.read(0, 1 << 16)
+        if not more:
+            return 0  # nothing was to be run
+        said += more
+    order = json.loads(said)
+    log = os.open(Path(order["logs"]) / "host.log", os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
+    os.dup2(log, 2)
     # No thread survives a fork: OpenCV must not start its own for what all nodes share.
     cv2.setNumThreads(1)
-    assembly = Assembly(load_scenario(parsed.scenario))
+    assembly = Assembly(load_scenario(Path(order["scenario"])))
     assembly.prepare()
-    endpoints = run_endpoints(assembly.scenario, parsed.sockets, parsed.by_hand)
-    nodes = Nodes(assembly, endpoints, parsed.logs)
+    endpoints = run_endpoints(assembly.scenario, Path(order["sockets"]), order["by_hand"])
+    nodes = Nodes(assembly, endpoints, Path(order["logs"]))
     for name in endpoints.nodes:
-        if name not in parsed.by_hand:
+        if name not in order["by_hand"]:
             nodes.fork(name)
     try:
         session = sessions.open_router([endpoints.router, assembly.scenario.network.router])
@@ -71,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         nodes.end()
     finally:
         sessions.close(session)
-        shutil.rmtree(parsed.sockets, ignore_errors=True)
+        shutil.rmtree(order["sockets"], ignore_errors=True)
     return 0
 
 

@@ -26,6 +26,7 @@ from network.messages import (
     PixelsMessage,
     StatusMessage,
 )
+from network.runtime import RUNTIME_ENVIRONMENT
 from network.streams import stream
 from network.transport import Links, links_of
 from network.weights import MetropolisWeights
@@ -83,7 +84,7 @@ def says(sender, round_, *payload):
 def processes_of(run, directory, **more):
     """The processes of a run: four cameras and the centralised filter."""
     spec = {"run": run, "names": NAMES, "directory": directory, "frames": 20, "iterations": 6, **more}
-    environment = os.environ | sessions.RUNTIME_ENVIRONMENT | {"PYTHONPATH": str(ROOT)}
+    environment = os.environ | RUNTIME_ENVIRONMENT | {"PYTHONPATH": str(ROOT)}
     script = str(Path(__file__).with_name("ring_node.py"))
     with contextlib.ExitStack() as stack:
         started = {}
