@@ -9,7 +9,8 @@ signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C, also while no run is the
 
 config = zenoh.Config.from_json5(
     """{mode: "client", scouting: {multicast: {enabled: false}},
-        connect: {endpoints: ["tcp/127.0.0.1:7447"], timeout_ms: -1}}"""
+        connect: {endpoints: ["tcp/127.0.0.1:7447"], timeout_ms: -1,
+                  retry: {period_init_ms: 100, period_max_ms: 200}}}"""
 )
 with zenoh.open(config) as session, session.declare_subscriber("dcpf/*/*/estimate") as subscriber:
     for sample in subscriber:
