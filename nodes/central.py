@@ -10,7 +10,7 @@ from jaxtyping import UInt8
 
 from network.messages import ConfirmMessage, EstimateMessage, PixelsMessage
 from nodes.estimator import SirEstimator
-from nodes.filtering.appearance import Appearance, pack_looks, unpack_looks
+from nodes.filtering.appearance import Appearance, pack_looks, settled, unpack_looks
 from nodes.filtering.observation import ObservationModel
 from nodes.setup import TrackingSetup
 
@@ -104,4 +104,4 @@ class Central:
             for name, image in images.items()
         }
         told = unpack_looks(np.mean([pack_looks(seen, color) for seen in own.values()], axis=0), color)
-        return {name: seen or told for name, seen in own.items()}
+        return {name: settled(seen, told, color) for name, seen in own.items()}

@@ -13,7 +13,7 @@ from jaxtyping import Float, UInt8
 from network.consensus import Consensus
 from network.messages import ConsensusMessage, EstimateMessage
 from nodes.estimator import SirEstimator
-from nodes.filtering.appearance import Appearance, pack_looks, unpack_looks
+from nodes.filtering.appearance import Appearance, pack_looks, settled, unpack_looks
 from nodes.filtering.fusion import fuse, is_density, pack, propagate, unpack
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.local import LocalResult, local_filter
@@ -197,10 +197,10 @@ class SmartCamera:
         return self._with_result(self._consensus.begin(0, looks))
 
     def _finish_first(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
-        """A camera that saw nothing takes the looks that the others saw."""
-        visible = self._appearance is not None
-        if self._appearance is None:
-            self._appearance = unpack_looks(self._consensus.value, self._setup.filter.color)
+        """A camera that saw nothing, or something else, takes the looks that the others saw."""
+        color = self._setup.filter.color
+        self._appearance = settled(self._appearance, unpack_looks(self._consensus.value, color), color)
+        visible = self._appearance is not None and self._appearance.own
         n = float(self._setup.filter.n_particles)
         message = self._message(frame, self._setup.start.moments, n, visible=visible)
         if self._single is None:

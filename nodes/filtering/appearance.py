@@ -111,6 +111,27 @@ def squared_distances(
     return 1 - np.divide(coefficient, perfect, out=np.zeros_like(perfect), where=perfect > 0)
 
 
+def distance_to(
+    histograms: Float[np.ndarray, "P C B"], reference: Appearance, options: ColorOptions
+) -> float:
+    """The distance d² of `squared_distances`, from normalised histograms."""
+    weights = np.array(options.part_weights)[:, None, None] / options.n_channels
+    omega, q = reference.distinctness, reference.histograms
+    perfect = (weights * omega * q).sum()
+    return float(1 - (weights * omega * np.sqrt(histograms * q)).sum() / perfect) if perfect > 0 else 1.0
+
+
+def settled(own: Appearance | None, told: Appearance | None, options: ColorOptions) -> Appearance | None:
+    """What a camera starts with: its own look at the start, or the network's mean.
+
+    Its own, unless it has none, or has seen something else than the others: a pillar in front of the target
+    lies as well in the picture as the target would.
+    """
+    if own is None or told is None:
+        return own or told
+    return told if distance_to(own.histograms, told, options) > told.miss_distance else own
+
+
 def update_appearance(
     appearance: Appearance,
     histograms: Float[np.ndarray, "P C B"],

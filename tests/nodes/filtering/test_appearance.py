@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 from nodes.filtering.appearance import (
     Appearance,
     ModelUpdateOptions,
+    distance_to,
     distinctness_of,
     full_codebook,
     normalize_counts,
     pack_looks,
     reference_codebook,
+    settled,
     squared_distances,
     unpack_looks,
     update_appearance,
@@ -201,3 +203,24 @@ def test_a_blind_camera_is_told_the_mean_of_those_that_saw(seed, n_seeing, n_bli
 
 def test_nobody_saw_anything():
     assert unpack_looks(pack_looks(None, PARTS), PARTS) is None
+
+
+@given(seeds)
+def test_the_distance_of_histograms_is_that_of_their_counts(seed):
+    rng = np.random.default_rng(seed)
+    counts, reference = random_counts(rng, PARTS, 1), random_counts(rng, PARTS, 1)[0] / 50
+    omega = rng.uniform(0.1, 1, reference.shape)
+    found = distance_to(counts[0] / 50, appearance_of(reference, distinctness=omega), PARTS)
+    assert found == pytest.approx(distances(counts, reference, PARTS, distinctness=omega)[0], abs=1e-12)
+
+
+def test_a_camera_that_saw_something_else_believes_the_others():
+    target, pillar = np.zeros((1, 1, 8)), np.zeros((1, 1, 8))
+    target[..., :2] = pillar[..., 2:4] = 0.5
+    seen = [appearance_of(each) for each in (target, target, target, pillar)]
+    told = unpack_looks(np.mean([pack_looks(each, JOINT) for each in seen], axis=0), JOINT)
+    assert settled(seen[0], told, JOINT) is seen[0]
+    assert settled(seen[3], told, JOINT) is told
+    assert settled(None, told, JOINT) is told
+    assert settled(seen[3], None, JOINT) is seen[3]
+    assert settled(None, None, JOINT) is None
