@@ -1,6 +1,6 @@
 """The host of a run's processes: starts the nodes, then becomes the run's router, and is the last to leave.
 
-It imports what a node needs once and forks each node from there, which starts a run three times as fast as so
+It imports what a node needs once and forks each node from there, which starts a run faster than so
 many interpreters and lets them share their memory. The forks come first: no thread and no session of Zenoh
 exists yet, neither of which would survive one.
 
