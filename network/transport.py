@@ -137,8 +137,5 @@ class Transport(Protocol):
             Its message, None when time is up or the sender is gone.
         """
 
-    def ask_estimate(self, name: str, timeout_s: float) -> EstimateMessage | None:
-        """A linked node's latest estimate, from which a node that returns goes on; None without an answer."""
-
     def close(self) -> None:
         """Leaves the network, within seconds whatever the others do."""

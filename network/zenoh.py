@@ -155,16 +155,6 @@ class ZenohTransport:
         finally:
             self._wait = None
 
-    def ask_estimate(self, name: str, timeout_s: float) -> EstimateMessage | None:
-        """A linked node's latest estimate, from which a node that returns goes on; None without an answer."""
-        for reply in self._session.get(keys.estimate(self._run, name), timeout=timeout_s):
-            if reply.ok is not None:
-                try:
-                    return codec.decode_public(EstimateMessage, reply.ok.payload.to_bytes())
-                except RefusedMessage as refusal:
-                    self.counters.refuse(name, refusal.reason)
-        return None
-
     def close(self) -> None:
         """Leaves the network, within seconds whatever the others do."""
         self._closed.set()
@@ -178,14 +168,14 @@ class ZenohTransport:
         """Hears orders to the run, and answers those who ask for the latest status and estimate."""
         self._session.declare_subscriber(keys.control(self._run), zenoh.handlers.Callback(self._on_order))
         for key in (keys.status(self._run, self._name), keys.estimate(self._run, self._name)):
-            self._session.declare_queryable(key, zenoh.handlers.Callback(self._answer))
+            self._session.declare_queryable(key, zenoh.handlers.Callback(partial(self._answer, key)))
 
     def _on_order(self, sample: zenoh.Sample) -> None:
         self._orders.put(sample.payload.to_bytes())
 
-    def _answer(self, query: zenoh.Query) -> None:
+    def _answer(self, key: str, query: zenoh.Query) -> None:
+        # Under the node's own key: the question may be a wildcard.
         with query:
-            key = str(query.key_expr)
             if key in self._latest:
                 query.reply(key, self._latest[key])
 

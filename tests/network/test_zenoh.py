@@ -254,14 +254,20 @@ def test_orders_reach_nodes(pair):
 
 def test_the_latest_joint_estimate_and_status_can_be_asked_for(pair):
     a, b = pair
-    assert a.ask_estimate("B", timeout_s=1.0) is None
+
+    def ask(key):
+        return [reply.ok.payload.to_bytes() for reply in a._session.get(key, timeout=2.0)]
+
+    assert ask(keys.estimate("run", "B")) == []
     for estimator, frame in (("dcpf", 1), ("dcpf", 2), ("single", 2)):
         b.send(estimate_of("B", estimator, frame))
-    found = a.ask_estimate("B", timeout_s=2.0)
-    assert (found.estimator, found.frame) == ("dcpf", 2)
     b.send(StatusMessage("B", "running", 2, {"late": 0}, {}))
-    (reply,) = list(a._session.get(keys.status("run", "B"), timeout=2.0))
-    assert codec.decode_public(StatusMessage, reply.ok.payload.to_bytes()).frame == 2
+    for node in ("B", "*"):
+        (answer,) = ask(keys.estimate("run", node))
+        found = codec.decode_public(EstimateMessage, answer)
+        assert (found.estimator, found.frame) == ("dcpf", 2)
+        (answer,) = ask(keys.status("run", node))
+        assert codec.decode_public(StatusMessage, answer).frame == 2
 
 
 def test_taken_endpoints_are_named(directory):
