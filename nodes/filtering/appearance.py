@@ -6,14 +6,15 @@ averaged over the channels, each normalised, and over the parts of the target by
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
 from pydantic import Field
 
 from network.options import Options
+from nodes.counting.codebook import Codebook, codebook
 from nodes.filtering.color import ColorOptions
-from nodes.filtering.histogram import Codebook, codebook
 
 
 class ModelUpdateOptions(Options):
@@ -102,13 +103,23 @@ def squared_distances(
     """
     q, omega = appearance.histograms, appearance.distinctness
     weights = np.array(options.part_weights) / book.n_channels
-    # h = counts / pixels; Σ_p w_p Σ_b ω √(h q)
+    # Σ_p w_p Σ_b ω √(h q), h = counts / pixels
     scale = (omega * np.sqrt(q))[book.codes < len(book.part)] * weights[book.part]
-    inverse_root = 1 / np.sqrt(np.maximum(pixels, 1))
-    coefficient = np.einsum("nk,k,nk->n", np.sqrt(counts), scale, inverse_root[:, book.part])
+    ends = np.searchsorted(book.part, np.arange(len(weights) + 1))
+    terms, of_box = scale[:, None] * np.sqrt(counts.T), pixels.T
+    coefficient = np.zeros(len(counts))
+    for part, (first, last) in enumerate(pairwise(ends)):
+        coefficient += _sum_in_order(terms[first:last]) / np.sqrt(np.maximum(of_box[part], 1))
     # Σ_p w_p Σ_b ω q over the parts that are in the picture
-    perfect = (pixels > 0) @ (weights * (omega * q).sum(axis=(1, 2)))
+    perfect = (weights * (omega * q).sum(axis=(1, 2))) @ (of_box > 0)
     return 1 - np.divide(coefficient, perfect, out=np.zeros_like(perfect), where=perfect > 0)
+
+
+def _sum_in_order(terms: Float[np.ndarray, "k N"]) -> Float[np.ndarray, " N"]:
+    """Σ over the codes, one after the other: a box's distance must not depend on how many there are."""
+    if terms.shape[1] == 1:  # NumPy would add a single column up in another order
+        return np.array([np.add.accumulate(terms[:, 0])[-1]]) if len(terms) else np.zeros(1)
+    return np.add.reduce(terms, axis=0)
 
 
 def distance_to(

@@ -12,6 +12,8 @@ from jaxtyping import Float, Int, UInt8
 
 from network.options import Options
 from nodes.camera import Camera
+from nodes.counting.codebook import Codebook
+from nodes.counting.histogram import SamplingOptions, count
 from nodes.filtering.appearance import (
     Appearance,
     ModelUpdateOptions,
@@ -23,7 +25,6 @@ from nodes.filtering.appearance import (
     update_appearance,
 )
 from nodes.filtering.color import ColorOptions, GainReference, channel_gain, gain_reference, quantize
-from nodes.filtering.histogram import Codebook, SamplingOptions, count
 from nodes.filtering.likelihood import LikelihoodOptions, background_constants, log_likelihoods
 from nodes.filtering.target import TargetOptions, project_boxes, visible_fraction
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nodes.counting.codebook import codebook
 from nodes.filtering.appearance import (
     Appearance,
     ModelUpdateOptions,
@@ -23,7 +24,6 @@ from nodes.filtering.appearance import (
     update_appearance,
 )
 from nodes.filtering.color import ColorOptions
-from nodes.filtering.histogram import codebook
 
 JOINT = ColorOptions(space="joint_rgb", bins_per_channel=2)
 RGB = ColorOptions(bins_per_channel=4)
