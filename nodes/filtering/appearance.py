@@ -1,19 +1,15 @@
-"""What the target looks like to one camera: the reference histograms, the distance to them, their update.
+"""What the target looks like to one camera: the reference histograms and their update.
 
-Sources: Jing & Chen, Eq. 4 (update) and 11 (normalisation); the Bhattacharyya distance d² = 1 - Σ √(h q),
-averaged over the channels, each normalised, and over the parts of the target by their weights.
+Sources: Jing & Chen, Eq. 4 (update) and 11 (normalisation).
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
 from pydantic import Field
 
 from network.options import Options
-from nodes.counting.codebook import Codebook, codebook
 from nodes.filtering.color import ColorOptions
 
 
@@ -61,17 +57,6 @@ def normalize_counts(
     return counts.reshape(shape) / np.maximum(pixels, 1)[:, :, None, None]
 
 
-@lru_cache
-def full_codebook(options: ColorOptions) -> Codebook:
-    """A codebook that tells every bin apart."""
-    return codebook(np.ones((len(options.parts), options.n_channels, options.n_bins), bool), options.parts)
-
-
-def reference_codebook(appearance: Appearance, options: ColorOptions) -> Codebook:
-    """A codebook of the bins of the reference that tell the target from its surroundings."""
-    return codebook(appearance.histograms * appearance.distinctness > 0, options.parts)
-
-
 def distinctness_of(
     target: Float[np.ndarray, "P C B"], surroundings: Float[np.ndarray, "P C B"]
 ) -> Float[np.ndarray, "P C B"]:
@@ -88,44 +73,10 @@ def distinctness_of(
     return np.where(target > 0, np.maximum(1 - surroundings / np.maximum(target, 1e-12), 0.0), 0.0)
 
 
-def squared_distances(
-    counts: Int[np.ndarray, "N K"],
-    pixels: Int[np.ndarray, "N P"],
-    appearance: Appearance,
-    book: Codebook,
-    options: ColorOptions,
-) -> Float[np.ndarray, " N"]:
-    """The weighted Bhattacharyya distance of each box to the reference, d² = 1 - Σ ω √(h q) / Σ ω q.
-
-    With ω = 1 it is the plain one, from 0 to 1. Otherwise a box that shows more of the target than the
-    reference's box did is nearer than the reference itself, below 0. Parts of which nothing is in the
-    picture, or in the reference, do not count; a box with none at all has distance 1.
-    """
-    q, omega = appearance.histograms, appearance.distinctness
-    weights = np.array(options.part_weights) / book.n_channels
-    # Σ_p w_p Σ_b ω √(h q), h = counts / pixels
-    scale = (omega * np.sqrt(q))[book.codes < len(book.part)] * weights[book.part]
-    ends = np.searchsorted(book.part, np.arange(len(weights) + 1))
-    terms, of_box = scale[:, None] * np.sqrt(counts.T), pixels.T
-    coefficient = np.zeros(len(counts))
-    for part, (first, last) in enumerate(pairwise(ends)):
-        coefficient += _sum_in_order(terms[first:last]) / np.sqrt(np.maximum(of_box[part], 1))
-    # Σ_p w_p Σ_b ω q over the parts that are in the picture
-    perfect = (weights * (omega * q).sum(axis=(1, 2))) @ (of_box > 0)
-    return 1 - np.divide(coefficient, perfect, out=np.zeros_like(perfect), where=perfect > 0)
-
-
-def _sum_in_order(terms: Float[np.ndarray, "k N"]) -> Float[np.ndarray, " N"]:
-    """Σ over the codes, one after the other: a box's distance must not depend on how many there are."""
-    if terms.shape[1] == 1:  # NumPy would add a single column up in another order
-        return np.array([np.add.accumulate(terms[:, 0])[-1]]) if len(terms) else np.zeros(1)
-    return np.add.reduce(terms, axis=0)
-
-
 def distance_to(
     histograms: Float[np.ndarray, "P C B"], reference: Appearance, options: ColorOptions
 ) -> float:
-    """The distance d² of `squared_distances`, from normalised histograms."""
+    """The distance d² of `nodes.filtering.pattern`, from normalised histograms."""
     weights = np.array(options.part_weights)[:, None, None] / options.n_channels
     omega, q = reference.distinctness, reference.histograms
     perfect = (weights * omega * q).sum()
