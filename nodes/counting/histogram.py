@@ -42,7 +42,9 @@ def count(
     Returns:
         Counts of each code, and pixels (of one channel) in each part; pixels outside count nowhere.
     """
-    boxes = np.where(np.isnan(boxes), -1e6, boxes)
+    nowhere = np.isnan(boxes[:, 0])
+    if nowhere.any():
+        boxes = np.where(nowhere[:, None], -1e6, boxes)
     if sampling.grid is None:
         counts, pixels = count_pixels(bins, boxes, book)
     else:

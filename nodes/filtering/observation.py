@@ -14,7 +14,7 @@ from jaxtyping import Float, Int, UInt8
 from network.options import Options
 from nodes.camera import Camera
 from nodes.counting.codebook import Codebook
-from nodes.counting.compiled import count_compiled, marks_of
+from nodes.counting.compiled import count_compiled
 from nodes.counting.histogram import SamplingOptions, count
 from nodes.filtering.appearance import (
     Appearance,
@@ -190,8 +190,7 @@ class ObservationModel:
                 picture.image,
                 coding(self.options.color, picture.gain),
                 boxes,
-                marks_of(pattern.book),
-                pattern.scale,
+                pattern.compiled,
                 sampling.grid,
                 sampling.kernel,
             )
@@ -213,7 +212,8 @@ class ObservationModel:
         book: Codebook,
     ) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, "N P"]]:
         # Only the region that the boxes cover is quantised.
-        left, top, right, bottom = covered_region(boxes[visible > 0], self.camera)
+        seen = visible > 0
+        left, top, right, bottom = covered_region(boxes if seen.all() else boxes[seen], self.camera)
         bins = quantize(picture.image[top:bottom, left:right], self.options.color, picture.gain)
         return count(bins, boxes - np.array([left, top, left, top]), book, self.options.sampling)
 

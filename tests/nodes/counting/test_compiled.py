@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from nodes.counting import build
 from nodes.counting.build import KernelError, load_kernel
 from nodes.counting.codebook import codebook
-from nodes.counting.compiled import count_compiled, marks_of
+from nodes.counting.compiled import compile_reference, count_compiled
 from nodes.counting.histogram import SamplingOptions, count
 from nodes.filtering.color import ColorOptions, coding, quantize
 
@@ -54,7 +54,7 @@ def test_counts_are_equal_to_the_last_one(seed, boxes, colors, parts, grid, shar
     sampling = SamplingOptions(grid=grid, kernel="epanechnikov")
     expected, expected_pixels = count(quantize(image, options, gain), boxes, book, sampling)
     counts, pixels, coefficients = count_compiled(
-        image, coding(options, gain), boxes, marks_of(book), scale, grid, sampling.kernel
+        image, coding(options, gain), boxes, compile_reference(book, scale), grid, sampling.kernel
     )
     np.testing.assert_array_equal(counts, expected)
     np.testing.assert_array_equal(pixels, expected_pixels)
