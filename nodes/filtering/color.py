@@ -32,8 +32,8 @@ class ColorOptions(Options):
     """`rgb`: a histogram of each channel (Eq. 7-8); `joint_rgb`: one of the three together; `hue`: one of the
     hue alone, with a last bin for what is too grey to have one."""
     bins_per_channel: int = Field(default=8, ge=2, le=256)
-    """Bins along each channel, at most 16 in RGB: 8 make 3 x 8 bins in `rgb`, 512 in `joint_rgb`, and in `hue`
-    7 sectors of the colour circle and one for grey."""
+    """Bins along each channel, at most 16 in RGB: 8 make 3 x 8 bins in `rgb`, 512 in `joint_rgb`, in `hue` 7
+    sectors of the colour circle and one for grey."""
     parts: tuple[float, ...] = (1.0,)
     """Heights of the target's parts from top to bottom, as fractions that add up to 1; each has its own
     histogram."""
