@@ -77,6 +77,11 @@ class TargetOptions(Options):
         return 3 if self.space == "volume" else 2
 
     @property
+    def subject(self) -> str:
+        """Name of the person or object in the world that is the target; empty for footage."""
+        return self.person or self.object or ""
+
+    @property
     def unit(self) -> Literal["m", "px"]:
         """The unit of the position."""
         return "px" if self.space == "image" else "m"
