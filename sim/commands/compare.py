@@ -103,10 +103,8 @@ def _print(report: dict[str, Any], folder: Path) -> None:
             )
     console.print(table)
     for label, each in report.items():
-        lost, disagreement = (
-            each["lost_fraction"],
-            _length(length(each, "disagreement"), "median", each["unit"]),
-        )
+        lost = each["lost_fraction"]
+        disagreement = _length(length(each, "disagreement"), "median", each["unit"])
         console.print(
             f"{label}: target lost in {lost['dcpf']:.0%} of the runs by DCPF, in {lost['cpf']:.0%} by CPF;"
             f" nodes disagree by {disagreement}",

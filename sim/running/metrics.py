@@ -1,6 +1,7 @@
 """How far an estimate was from the truth, and whether it knew.
 
-Lengths are in the unit of the target's space: metres, or pixels in the image plane. Frame 0 is the initialisation and does not count.
+Lengths are in the unit of the target's space: metres, or pixels in the image plane. Frame 0 is the
+initialisation and does not count.
 """
 
 import numpy as np
@@ -30,7 +31,7 @@ def rmse(errors: Float[np.ndarray, "..."]) -> float:
 
 
 def is_lost(errors: Float[np.ndarray, " T"], limit: float = LOST_ERROR) -> bool:
-    """Whether the mean error of the last frames is above the limit, so that the target was lost, or unknown."""
+    """Whether the mean error of the last frames says that the target was lost, or nothing is there."""
     last = errors[-LOST_FRAMES:]
     known = last[~np.isnan(last)]
     return not known.size or float(known.mean()) > limit
