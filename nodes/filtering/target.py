@@ -60,7 +60,7 @@ class TargetOptions(Options):
         if self.space != "image":
             if self.size_px is not None:
                 raise ValueError(
-                    f"size_px is for the image plane: in a {self.space} give height and width, in m"
+                    "size_px is for the image plane: on a plane or in a volume give height and width, in m"
                 )
             return self
         if self.size_px is None:

@@ -189,7 +189,7 @@ class Scenario(Options):
         for key, vector in (("velocity", target.start.velocity), ("position", target.start.position)):
             if vector != "truth" and len(vector) != target.n_axes:
                 raise ValueError(
-                    f"target.start.{key} has {len(vector)} numbers: {SPACES[target.space]} needs"
+                    f"target.start.{key} has {len(vector)} numbers: a target {SPACES[target.space]} needs"
                     f" {target.n_axes}"
                 )
         return self
@@ -234,8 +234,8 @@ class Scenario(Options):
         return len(self.cameras) + self.baselines.cpf + 1
 
 
-SPACES = {"plane": "a target on a plane", "volume": "a target in a volume", "image": "a target in the image"}
-"""What messages call a target in each of the spaces."""
+SPACES = {"plane": "on a plane", "volume": "in a volume", "image": "in the image plane"}
+"""Where a target is, in words."""
 
 GRAPHS = {"ring": ring, "path": path, "star": star, "complete": complete, "grid": grid}
 """The graphs that a scenario can name."""
