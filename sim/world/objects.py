@@ -117,7 +117,7 @@ def _tapered_cylinder(options: ObjectOptions) -> Solids:
     # corners run up one edge of a strip and down the next one, clockwise from outside
     number = np.arange(rings.size // 3).reshape(n_bands + 1, n)
     after = np.roll(number, -1, axis=1)
-    sides = np.stack([after[:-1], after[1:], number[1:], number[:-1]], axis=-1).reshape(-1, 4)
+    sides = np.stack([number[:-1], number[1:], after[1:], after[:-1]], axis=-1).reshape(-1, 4)
     top, k = number[-1], np.arange(n // 2 - 1)
     lid = np.stack([top[k], top[-1 - k], top[-2 - k], top[k + 1]], axis=-1)
     faces = np.concatenate([sides, lid])

@@ -12,7 +12,7 @@ from sim.world.mesh import Box, box_around, fill
 
 PERSON_RADIUS = 0.30
 """The floor is darker this far around a person, as a fraction of the stature."""
-OBJECT_RADIUS = 1.6
+OBJECT_RADIUS = 2.5
 """And this far around an object, in radii."""
 _ANGLES = np.linspace(0, 2 * np.pi, 12, endpoint=False)
 _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), np.zeros(len(_ANGLES))], axis=1)
