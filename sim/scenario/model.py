@@ -200,6 +200,11 @@ class Scenario(Options):
             raise ValueError(
                 f"target names the person {target.person} and the object {target.object}: set one to null"
             )
+        if target.person is None and target.object is None:
+            there = [person.name for person in world.people] + [each.name for each in world.objects]
+            raise ValueError(
+                f"target needs a person or an object of the world: name one of {', '.join(there)}"
+            )
         if target.object is None:
             key, group, known = "person", "people", [person.name for person in world.people]
         else:
