@@ -13,7 +13,7 @@ from jaxtyping import Float, Int, UInt8
 from network.options import Options
 from nodes.camera import Camera
 from nodes.counting.codebook import Codebook
-from nodes.counting.compiled import count_compiled
+from nodes.counting.compiled import distances_compiled
 from nodes.counting.histogram import SamplingOptions, locate
 from nodes.filtering.appearance import (
     Appearance,
@@ -189,13 +189,9 @@ class ObservationModel:
             image, code = picture.image, coding(color, picture.gain)
             if color.space == "hue":
                 image = without_gain(image, picture.gain)
-            _, pixels, coefficient = count_compiled(
-                image, code, boxes, pattern.compiled, sampling.grid, sampling.kernel
-            )
-        else:
-            counts, pixels = self._count(picture, boxes, pattern.book)
-            coefficient = coefficients(counts, pixels, pattern)
-        return squared_distances(coefficient, pixels, pattern)
+            return distances_compiled(image, code, boxes, pattern.compiled, sampling.grid, sampling.kernel)
+        counts, pixels = self._count(picture, boxes, pattern.book)
+        return squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
 
     def _histograms(self, picture: Picture, boxes: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N P C B"]:
         color = self.options.color
