@@ -69,13 +69,15 @@ class ProcessorArray(LaneMachine):
             value = value >> bits
         self._store(target, target.wrapped(value), None)
 
-    def rotate_in(self, target: Word, carry: Lanes) -> Lanes:
-        """target = 2 · target + carry; returns the bit that falls out, as 0 or 1."""
-        n = target.n_words
+    def rotate(self, high: Word, low: Word) -> None:
+        """Shifts two values that follow each other left by a bit: the highest bit of low moves into high."""
+        n = high.n_words + low.n_words
         self._count(load=n, operate=n, store=n)
-        value = self._value(target)
-        self._store(target, target.wrapped((value << 1) | carry), None)
-        return value >> (target.bits - 1)
+        high_value, low_value = self._value(high), self._value(low)
+        carry = low_value >> (low.bits - 1)
+        carry |= high_value << 1
+        self._store(high, high.wrapped(carry), None)
+        self._store(low, low.wrapped(low_value << 1), None)
 
     def multiply(
         self, target: Word, a: Operand, b: Operand, b_words: int = 1, drop: int = 0, when: Flag | None = None
@@ -104,7 +106,7 @@ class ProcessorArray(LaneMachine):
         wide = np.int64 if pairs > 2 else np.int32
         product = np.asarray(first, wide) * np.asarray(second, wide)
         value = target.wrapped(product >> drop * self.options.bits)
-        self._store(target, value.astype(np.int32) if target.bits < 32 else value, when)
+        self._store(target, value.astype(target.dtype, copy=False), when)
 
     def high_words(self, target: Word, a: Word) -> None:
         """target = the highest words of a."""
@@ -204,7 +206,8 @@ class ProcessorArray(LaneMachine):
             self.add(total, total, a, when)
             return
         self._count(load=total.n_words, operate=total.n_words, store=total.n_words)
-        total.value = total.wrapped(self._loop.carry(total) + self._loop.total(self._value(a), when))
+        added = self._loop.total(self._value(a), when)
+        total.value = total.wrapped(self._loop.carry(total) + added).astype(total.dtype, copy=False)
 
     def keep(self, target: Word, a: Operand, when: Flag) -> None:
         """target = a where the flag is set, also over the iterations of a loop."""

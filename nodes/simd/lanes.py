@@ -93,11 +93,11 @@ class LaneMachine:
     def _store(self, target: Word, value: Any, when: Flag | None) -> None:
         if when is not None:
             old = self._value(target)
-            value = np.where(when, value, old) if target.real else old ^ ((old ^ value) & -when.view(np.int8))
+            value = _chosen(when, value, old)
         if self._loop:
             self._loop.write(target)
         if np.ndim(value) == 0:
-            value = np.full(self.n, value, np.float64 if target.real else np.int32)
+            value = np.full(self.n, value, target.dtype)
         elif value.shape[-1] != self.n:
             value = np.broadcast_to(value, (*value.shape[:-1], self.n))
         target.value = value
@@ -124,3 +124,14 @@ class LaneMachine:
             self._loop.finish()
         finally:
             self._loop = None
+
+
+def _chosen(when: Flag, value: Any, old: Lanes) -> Lanes:
+    """The value where the flag is set, else the old one: np.where, which is slow on long arrays of integers."""
+    if old.dtype.kind == "f":
+        return np.where(when, value, old)
+    # old ⊕ ((old ⊕ value) ∧ mask)
+    changed = np.negative(when.view(np.int8), dtype=old.dtype)
+    changed &= old ^ value
+    changed ^= old
+    return changed

@@ -18,9 +18,10 @@ class Loop:
 
     def __init__(self, n: int) -> None:
         self.n = n
-        self._read: set[int] = set()
+        # by identity; the words are held so that none takes the identity of one that is gone
+        self._read: dict[int, Word] = {}
         self._written: dict[int, Word] = {}
-        self._carried: set[int] = set()
+        self._carried: dict[int, Word] = {}
         self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def read(self, word: Word) -> None:
@@ -28,7 +29,7 @@ class Loop:
         if id(word) in self._carried:
             raise ValueError(f"a word of {word.owner} is read in the loop that adds it up: read it afterwards")
         if id(word) not in self._written:
-            self._read.add(id(word))
+            self._read[id(word)] = word
 
     def write(self, word: Word) -> None:
         """Notes that an iteration writes a word."""
@@ -42,7 +43,7 @@ class Loop:
         """The value before the loop of a word that the iterations hand on."""
         if id(word) in self._read or id(word) in self._written:
             raise ValueError(f"a word of {word.owner} is both carried and used otherwise in a loop")
-        self._carried.add(id(word))
+        self._carried[id(word)] = word
         return word.value
 
     def total(self, value: Any, when: Bool[np.ndarray, "n P"] | None) -> Any:

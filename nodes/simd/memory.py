@@ -10,6 +10,9 @@ from jaxtyping import Integer, Num
 TEMPORARY = "Temporary variables"
 """What words belong to that are not named otherwise."""
 
+WIDE = 31
+"""Bits from which on the emulation holds a value in 64 bits."""
+
 
 class LineMemoryError(ValueError):
     """A program needs more words than the processing elements have; the message is the table of their use."""
@@ -35,12 +38,19 @@ class Word:
         self.bits = bits
         self.signed = signed
         self.real = real
-        self.value: Num[np.ndarray, "*n P"] = np.zeros(lanes, np.float64 if real else np.int32)
+        self.value: Num[np.ndarray, "*n P"] = np.zeros(lanes, self.dtype)
+
+    @property
+    def dtype(self) -> type[np.number]:
+        """How the emulation holds a lane."""
+        return np.float64 if self.real else np.int32 if self.bits < WIDE else np.int64
 
     def wrapped(self, value: Any) -> Any:
         """What is left of a value in so many bits: it wraps around."""
         if self.real:
             return np.asarray(value, np.float64)
+        if self.bits >= WIDE:
+            value = np.asarray(value, np.int64)
         mask = (1 << self.bits) - 1
         if self.signed:
             half = 1 << (self.bits - 1)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -21,8 +22,8 @@ from nodes.simd.programs.resampling import replicate, replication_bounds
 from nodes.simd.programs.weighing import Reference, add_coefficient, likelihood, reference
 from nodes.simd.report import FrameReport, Step
 
-BESIDE_HISTOGRAMS = 22
-"""Words that the program needs for everything else, with numbers of one word."""
+BESIDE_HISTOGRAMS = MappingProxyType({1: 22, 2: 29})
+"""Words that the program needs for everything else, with numbers of one word or of two."""
 
 
 class TrackerOptions(Options):
@@ -93,7 +94,7 @@ class SimdTracker:
         self._generator = array.word(n_words=2)
         self._buffers = tuple(array.word("Video line buffers") for _ in range(3))
         self._sampling = tuple(array.word() for _ in range(3))
-        free = options.simd.words - BESIDE_HISTOGRAMS - 3 * (options.simd.number_words - 1)
+        free = options.simd.words - BESIDE_HISTOGRAMS[options.simd.number_words]
         n_words = options.histogram_words or min(options.binning.n_bins, max(free, 1))
         self._histogram = [array.word("Histograms") for _ in range(min(n_words, options.binning.n_bins))]
         self._place = array.word()
@@ -160,11 +161,11 @@ class SimdTracker:
         coefficient = array.number()
         with array.using(coefficient):
             self._compare(coefficient)
+            # The histograms are not needed any more: what follows takes their words.
+            array.free(*self._histogram)
             with array.step(Step.LIKELIHOODS):
                 self._weigh(coefficient)
         self._particles, self._weights = self._positions(), self._weight.value.astype(float)
-        # The histograms are not needed any more, and the normalisation takes their words.
-        array.free(*self._histogram)
         means = np.stack([self._estimate_and_resample(target) for target in self._targets])
         self._histogram = [array.word("Histograms") for _ in self._histogram]
         return means

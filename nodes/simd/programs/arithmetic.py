@@ -20,7 +20,7 @@ def divide(array: ProcessorArray, dividend: Word, divisor: Word) -> None:
         array.copy(remainder, 0)
         for _ in range(dividend.bits):
             # The highest bit of the dividend moves to the remainder, the quotient follows from below.
-            array.rotate_in(remainder, array.rotate_in(dividend, 0))
+            array.rotate(remainder, dividend)
             fits = array.at_least(remainder, divisor)
             array.subtract(remainder, remainder, divisor, when=fits)
             array.set_low_bit(dividend, fits)

@@ -35,7 +35,7 @@ class BinningOptions(Options):
         return self.bins**3 if self.space == "joint_rgb" else self.bins
 
 
-LINES_AT_ONCE = 40
+LINES_AT_ONCE = 120
 """Lines of a picture that the emulation runs at once: so many that they stay in the processor's cache."""
 
 

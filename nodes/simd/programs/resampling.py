@@ -183,7 +183,7 @@ def _draw_rest(
         if n_draws == 0:
             return
         draws = rng.random(n_draws) * array.peek(sums, group.last)
-        draws = draws[:, None] if rest.real else np.floor(draws[:, None]).astype(np.int64)
+        draws = draws if rest.real else np.floor(draws).astype(np.int64)
         array.copy(drawn, 0)
         for draw in array.repeat(n_draws):
             hit = array.both(array.at_least(draws[draw], before), array.less(draws[draw], sums))
