@@ -38,6 +38,10 @@ class ProcessorArray(LaneMachine):
 
     def subtract(self, target: Word, a: Operand, b: Operand, when: Flag | None = None) -> None:
         """target = a - b."""
+        if when is not None and target is a and not target.real:
+            # the same as choosing afterwards, and quicker to emulate: nothing is subtracted elsewhere
+            b = self._value(b) & -when.view(np.int8)
+            when = None
         self._apply(np.subtract, target, a, b, when=when)
 
     def minimum(self, target: Word, a: Operand, b: Operand) -> None:
@@ -51,6 +55,10 @@ class ProcessorArray(LaneMachine):
     def xor(self, target: Word, a: Operand, b: Operand) -> None:
         """target = a ⊕ b."""
         self._apply(np.bitwise_xor, target, a, b)
+
+    def mask(self, target: Word, a: Operand, bits: int) -> None:
+        """target = the lowest bits of a."""
+        self._apply(np.bitwise_and, target, a, (1 << bits) - 1)
 
     def shift_left(self, target: Word, a: Operand, bits: int) -> None:
         """target = a · 2^bits, wrapped; all but one of several words take what the next one shifts out."""
@@ -227,12 +235,11 @@ class ProcessorArray(LaneMachine):
         self._store(target, padded, None)
 
     def fetch(self, target: Word, memory: ExternalMemory, column: Word, row: Word, active: slice) -> None:
-        """The input processor reads the pixel that each active element asks for from the external memory."""
+        """The input processor reads the pixel that each active element asks for; -1 outside of the picture."""
         columns, rows = self._value(column)[..., active], self._value(row)[..., active]
         self._cost.external_reads += columns.shape[-1] * (self._loop.n if self._loop else 1)
-        pixels = memory.pixels[rows, columns]
-        value = np.full((*pixels.shape[:-1], self.n), -1, pixels.dtype)
-        value[..., active] = pixels
+        value = np.full((*columns.shape[:-1], self.n), -1, np.int16)
+        value[..., active] = memory.read(columns, rows)
         self._store(target, value, None)
 
     def output(self, word: Word, memory: ExternalMemory, rows: Integer[np.ndarray, "..."] | np.integer) -> None:

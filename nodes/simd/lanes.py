@@ -53,9 +53,11 @@ class LaneMachine:
 
     # Line memory
 
-    def word(self, owner: str = TEMPORARY, n_words: int = 1, *, signed: bool = False) -> Word:
-        """Allocates an integer."""
-        return self._allocate(owner, n_words, signed=signed, real=False)
+    def word(
+        self, owner: str = TEMPORARY, n_words: int = 1, *, signed: bool = False, real: bool = False
+    ) -> Word:
+        """Allocates an integer, or a real number that the chip would hold in so many words."""
+        return self._allocate(owner, n_words, signed=signed, real=real)
 
     def number(self, owner: str = TEMPORARY, n_words: int | None = None, *, signed: bool = False) -> Word:
         """Allocates a number of the chosen arithmetic: fixed point, or real."""

@@ -103,7 +103,22 @@ class LineMemory:
 
 
 class ExternalMemory:
-    """Pixels outside the chip; the digital input and output processors reach any of them."""
+    """A picture's bins outside the chip; the digital input and output processors reach any of them.
+
+    Attributes:
+        pixels: The bins; around them lies a border of -1.
+    """
 
     def __init__(self, height: int, width: int) -> None:
-        self.pixels: Integer[np.ndarray, "H W"] = np.zeros((height, width), np.int16)
+        self._bordered = np.full((height + 2, width + 2), -1, np.int16)
+        self.pixels: Integer[np.ndarray, "H W"] = self._bordered[1:-1, 1:-1]
+
+    def read(
+        self, columns: Integer[np.ndarray, "..."], rows: Integer[np.ndarray, "..."]
+    ) -> Integer[np.ndarray, "..."]:
+        """The bins at these places, -1 where they are outside."""
+        height, width = self._bordered.shape
+        index = np.minimum(np.maximum(rows + 1, 0), height - 1)
+        index *= width
+        index += np.minimum(np.maximum(columns + 1, 0), width - 1)
+        return self._bordered.take(index)

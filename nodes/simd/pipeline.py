@@ -1,7 +1,7 @@
-"""The frame pipeline: odd lines are binned and stored, in the even ones the picture before is worked on.
+"""The frame pipeline: in the odd line intervals the picture is stored, in the even ones the last is worked on.
 
-Source: Medeiros et al. (2008), sections 3.5 and 4. Does a program hold the frame rate, and how much of each
-line interval is used? The estimate of a picture is ready one frame after it.
+Source: Medeiros et al. (2008), sections 3.5 and 4. Does a program hold the frame rate, and how much of each line
+interval is used? The estimate of a picture is ready one frame after it.
 """
 
 from collections.abc import Mapping
@@ -10,14 +10,14 @@ from math import ceil
 
 from nodes.simd.cost import Cost
 
-FRAME_INTERVAL_US = 1e6 / 30
-"""A frame of the VGA sensor."""
+SENSOR_HZ = 30.0
+"""Frames a second of the VGA sensor."""
 LINE_INTERVAL_US = 69.5
 """A line of it, as the paper has it."""
 VGA_LINES = 480
-"""Half of them, the odd ones, bring a line of the picture to store."""
+"""Line intervals of a frame, in which something can be moved and computed."""
 ELEMENTS_PER_LINE = 640
-"""What can be moved to or from the external memory in a line interval."""
+"""What can be moved to or from the external memory in one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,71 +25,80 @@ class Pipeline:
     """How a frame fits into the line intervals.
 
     Attributes:
-        odd_line_us: The array's work in an odd line interval, binning one line.
-        even_line_us: Its work in an even one that brings samples: the histograms' update.
-        even_lines: Even line intervals that bring samples.
-        elements: Elements that such an interval moves.
-        rest_us: The work after the last sample.
-        rest_lines: Even line intervals that this takes.
-        lines: Lines of the picture.
-        busy_us: The array's work in a frame.
+        storing_lines: Line intervals in which the picture is binned and stored.
+        storing_us: The array's work in such an interval.
+        reading_lines: Line intervals in which samples are read and counted.
+        reading_us: The array's work in such an interval.
+        elements: What such an interval reads.
+        rest_lines: Line intervals for everything else, after the last sample.
+        rest_us: The array's work in all of them.
     """
 
-    odd_line_us: float
-    even_line_us: float
-    even_lines: int
+    storing_lines: int
+    storing_us: float
+    reading_lines: int
+    reading_us: float
     elements: int
-    rest_us: float
     rest_lines: int
-    lines: int
-    busy_us: float
+    rest_us: float
+
+    @property
+    def lines(self) -> int:
+        """Line intervals that a frame takes."""
+        return self.storing_lines + self.reading_lines + self.rest_lines
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames a second that the program holds, the sensor's at most."""
+        busiest = max(self.storing_us, self.reading_us) / LINE_INTERVAL_US
+        return SENSOR_HZ * min(VGA_LINES / self.lines, 1.0) / max(busiest, 1.0)
 
     @property
     def holds(self) -> bool:
-        """Whether the program holds 30 frames/s."""
-        return (
-            self.odd_line_us <= LINE_INTERVAL_US
-            and self.even_line_us <= LINE_INTERVAL_US
-            and max(self.lines, self.even_lines + self.rest_lines) <= VGA_LINES // 2
-        )
+        """Whether it holds the sensor's 30 frames/s."""
+        return self.rate_hz >= SENSOR_HZ
+
+    @property
+    def busy_us(self) -> float:
+        """The array's work in a frame."""
+        return self.storing_lines * self.storing_us + self.reading_lines * self.reading_us + self.rest_us
 
     @property
     def share_of_frame(self) -> float:
-        """The part of a frame interval for which the array is busy."""
-        return self.busy_us / FRAME_INTERVAL_US
+        """The part of a frame interval in which the array is busy."""
+        return self.busy_us * 1e-6 * SENSOR_HZ
 
 
 def pipeline(
-    costs: Mapping[str, Cost], storing: str, sampling: str, n_active: int, lines: int, clock_mhz: float
+    costs: Mapping[str, Cost], storing: str, reading: str, n_active: int, lines: int, clock_mhz: float
 ) -> Pipeline:
     """Lays a frame's counted work out over the line intervals.
 
-    One sample of each active element comes in a line interval, unless that would take more even lines than
-    there are: then as many as the external memory can give.
+    A line interval reads one sample of each active element, as the paper's program does; more, up to what the
+    external memory can give, only where that would not hold the frame rate.
 
     Args:
         costs: Of a frame, by step.
-        storing: The step of the odd lines.
-        sampling: The step that reads samples from the external memory.
-        n_active: Elements that ask for samples.
+        storing: The step that bins and stores.
+        reading: The step that reads samples and counts.
+        n_active: Elements that ask for samples at once.
         lines: Lines of the picture.
         clock_mhz: Of the array.
     """
     microseconds = {name: cost.microseconds(clock_mhz) for name, cost in costs.items()}
-    rest_us = sum(us for name, us in microseconds.items() if name not in {storing, sampling})
+    storing_lines = max(lines, ceil(costs[storing].external_writes / ELEMENTS_PER_LINE))
+    rest_us = sum(us for name, us in microseconds.items() if name not in {storing, reading})
     rest_lines = ceil(rest_us / LINE_INTERVAL_US)
-    samples = ceil(costs[sampling].external_reads / n_active)
-    free_lines = max(VGA_LINES // 2 - rest_lines, 1)
-    most = max(ELEMENTS_PER_LINE / n_active, 1e-9)
-    per_line = min(max(samples / free_lines, 1.0), most)
-    even_lines = ceil(samples / per_line)
+    reads = costs[reading].external_reads
+    free_lines = max(VGA_LINES - storing_lines - rest_lines, 1)
+    elements = min(max(n_active, ceil(reads / free_lines)), ELEMENTS_PER_LINE)
+    reading_lines = ceil(reads / elements)
     return Pipeline(
-        odd_line_us=microseconds[storing] / lines,
-        even_line_us=microseconds[sampling] / even_lines,
-        even_lines=even_lines,
-        elements=ceil(per_line * n_active),
-        rest_us=rest_us,
+        storing_lines=storing_lines,
+        storing_us=microseconds[storing] / storing_lines,
+        reading_lines=reading_lines,
+        reading_us=microseconds[reading] / reading_lines,
+        elements=elements,
         rest_lines=rest_lines,
-        lines=lines,
-        busy_us=sum(microseconds.values()),
+        rest_us=rest_us,
     )

@@ -11,12 +11,14 @@ def divide(array: ProcessorArray, dividend: Word, divisor: Word) -> None:
     """dividend = ⌊dividend / divisor⌋, by restoring division, one step for each bit of the dividend.
 
     The program memory is small and one routine serves the colours, the weights and the mean, so that it takes
-    what all of them need: several words on both sides. Dividing by 0 gives all ones.
+    what all of them need: several words on both sides. What dividing by 0 gives means nothing.
     """
     if dividend.real:
-        array.real(dividend, np.divide, dividend, divisor)
+        array.real(dividend, _quotient, dividend, divisor)
         return
     with array.using(array.word(n_words=divisor.n_words)) as (remainder,):
+        # Shifted, it may have a bit more than the divisor: the carry, which the comparison takes into account.
+        remainder.bits += 1
         array.copy(remainder, 0)
         for _ in range(dividend.bits):
             # The highest bit of the dividend moves to the remainder, the quotient follows from below.
@@ -70,6 +72,10 @@ def exponential(array: ProcessorArray, result: Word, exponent: Word, integer_bit
             flag = array.bit(exponent, bit)
             array.multiply(product, product, factor, b_words=n_words, drop=n_words, when=flag)
         array.high_words(result, product)
+
+
+def _quotient(dividend: Float[np.ndarray, "..."], divisor: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    return np.divide(dividend, divisor, out=np.zeros(dividend.shape), where=divisor != 0)
 
 
 def _decay(exponent: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
