@@ -81,13 +81,19 @@ class SimdTracker:
         self._rng = rng
         self.array = array = ProcessorArray(options.simd, batching=batching)
         n_used = sum(options.n_particles)
-        if n_used > array.n:
-            raise ValueError(f"{n_used} particles need as many processing elements, there are {array.n}")
+        most = min(array.n, (1 << options.simd.bits) - 3)
+        if n_used > most:
+            raise ValueError(f"{n_used} particles are too many: the array has room for {most}")
+        self._region = region(*options.region_px, options.shape, options.kernel)
+        if self._region.total >= 1 << options.simd.bits:
+            raise ValueError(
+                f"the samples of a region count {self._region.total} in all and a word holds"
+                f" {(1 << options.simd.bits) - 1}: choose a smaller region"
+            )
         # the rightmost elements, as in the paper
         firsts = accumulate(options.n_particles[:-1], initial=array.n - n_used)
         self._groups = [Group(first, n) for first, n in zip(firsts, options.n_particles, strict=True)]
         self._active = slice(array.n - n_used, array.n)
-        self._region = region(*options.region_px, options.shape, options.kernel)
         # Everything that lives from one frame to the next, or through the odd lines in between
         self._state = [array.number("Target state (current and previous)", 1) for _ in range(4)]
         self._weight = array.number("Particle weights")
@@ -123,6 +129,8 @@ class SimdTracker:
         height, width = image.shape[:2]
         if width > self.array.n:
             raise ValueError(f"the picture is {width} pixels wide and the array has {self.array.n} elements")
+        if self.options.region_px[0] > width or self.options.region_px[1] > height:
+            raise ValueError(f"a region of {self.options.region_px} pixels is larger than the picture")
         if len(positions) != len(self._groups):
             raise ValueError(f"{len(positions)} positions for {len(self._groups)} targets")
         self._memory = ExternalMemory(height, width)

@@ -8,12 +8,15 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, UInt8
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from network.options import Options
 from nodes.simd.array import ProcessorArray
 from nodes.simd.memory import ExternalMemory, Word
 from nodes.simd.programs.arithmetic import divide
+
+MAX_BINS = 512
+"""The most bins of a histogram; one more number stands for pixels without a hue."""
 
 
 class BinningOptions(Options):
@@ -22,12 +25,20 @@ class BinningOptions(Options):
     space: Literal["hue", "joint_rgb"] = "hue"
     """`hue`: of HSV, with a bin of its own for grey and dark pixels; `joint_rgb`: the three
     together."""
-    bins: int = Field(default=40, ge=2, le=512)
+    bins: int = Field(default=40, ge=2)
     """Bins of the hue, or along each channel."""
     min_saturation: float = Field(default=0.15, ge=0, le=1)
     """Below this saturation a pixel has no hue."""
     min_value: int = Field(default=30, ge=0, le=255)
     """Below this brightness a pixel has no hue."""
+
+    @model_validator(mode="after")
+    def _not_more_than_a_pixel_holds(self) -> "BinningOptions":
+        if self.n_bins > MAX_BINS:
+            raise ValueError(
+                f"bins must give {MAX_BINS} bins at most, {self.bins} along each channel are {self.n_bins}"
+            )
+        return self
 
     @property
     def n_bins(self) -> int:
