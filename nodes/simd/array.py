@@ -1,9 +1,9 @@
 """The linear processor array: what its elements can do, statement by statement.
 
-Source: Medeiros et al. (2008), section 3.1. All elements do the same to the same address of their line memory;
-an operand may be a neighbour's word or an immediate value that the global control processor broadcasts, and a
-store may depend on the element's flag. A statement is load, operate, store for each word of its values, the
-carry staying in the element. Values wrap around in the bits of their word.
+Source: Medeiros et al. (2008), section 3.1. All elements do the same to the same address of their line
+memory; an operand may be a neighbour's word or an immediate value that the global control processor
+broadcasts, and a store may depend on the element's flag. A statement is load, operate, store for each word of
+its values, the carry staying in the element. Values wrap around in the bits of their word.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,7 +16,7 @@ from nodes.simd.memory import ExternalMemory, Word
 
 
 class ProcessorArray(LaneMachine):
-    """The processing elements with their instructions, the I/O processors and the global control processor."""
+    """The processing elements, the input and output processors and the global control processor."""
 
     # Arithmetic
 
@@ -28,16 +28,16 @@ class ProcessorArray(LaneMachine):
         self._store(target, target.wrapped(operate(*map(self._value, operands))), when)
 
     def copy(self, target: Word, a: Operand, when: Flag | None = None) -> None:
-        """target = a."""
+        """Stores a."""
         self._count(load=target.n_words, store=target.n_words)
         self._store(target, target.wrapped(self._value(a)), when)
 
     def add(self, target: Word, a: Operand, b: Operand, when: Flag | None = None) -> None:
-        """target = a + b."""
+        """Stores a + b."""
         self._apply(np.add, target, a, b, when=when)
 
     def subtract(self, target: Word, a: Operand, b: Operand, when: Flag | None = None) -> None:
-        """target = a - b."""
+        """Stores a - b."""
         if when is not None and target is a and not target.real:
             # the same as choosing afterwards, and quicker to emulate: nothing is subtracted elsewhere
             b = self._value(b) & -when.view(np.int8)
@@ -45,28 +45,28 @@ class ProcessorArray(LaneMachine):
         self._apply(np.subtract, target, a, b, when=when)
 
     def minimum(self, target: Word, a: Operand, b: Operand) -> None:
-        """target = min(a, b)."""
+        """Stores min(a, b)."""
         self._apply(np.minimum, target, a, b)
 
     def maximum(self, target: Word, a: Operand, b: Operand) -> None:
-        """target = max(a, b)."""
+        """Stores max(a, b)."""
         self._apply(np.maximum, target, a, b)
 
     def xor(self, target: Word, a: Operand, b: Operand) -> None:
-        """target = a ⊕ b."""
+        """Stores a ⊕ b."""
         self._apply(np.bitwise_xor, target, a, b)
 
     def mask(self, target: Word, a: Operand, bits: int) -> None:
-        """target = the lowest bits of a."""
+        """Stores the lowest bits of a."""
         self._apply(np.bitwise_and, target, a, (1 << bits) - 1)
 
     def shift_left(self, target: Word, a: Operand, bits: int) -> None:
-        """target = a · 2^bits, wrapped; all but one of several words take what the next one shifts out."""
+        """Stores a · 2^bits, wrapped; all but one of several words take what the next one shifts out."""
         self._count(load=target.n_words, operate=2 * target.n_words - 1, store=target.n_words)
         self._store(target, target.wrapped(self._value(a) * (1 << bits)), None)
 
     def shift_right(self, target: Word, a: Operand, bits: int) -> None:
-        """target = ⌊a / 2^bits⌋; a real number is not rounded."""
+        """Stores ⌊a / 2^bits⌋; a real number is not rounded."""
         self._count(load=target.n_words, operate=2 * target.n_words - 1, store=target.n_words)
         value = self._value(a)
         if target.real:
@@ -90,7 +90,7 @@ class ProcessorArray(LaneMachine):
     def multiply(
         self, target: Word, a: Operand, b: Operand, b_words: int = 1, drop: int = 0, when: Flag | None = None
     ) -> None:
-        """target = ⌊a · b / 2^(drop · bits)⌋: the words of the product from `drop` on.
+        """Stores ⌊a · b / 2^(drop · bits)⌋: the words of the product from `drop` on.
 
         Each pair of words is one multiplication into an accumulator of two words; the words that are dropped
         are computed but not stored.
@@ -117,7 +117,7 @@ class ProcessorArray(LaneMachine):
         self._store(target, value.astype(target.dtype, copy=False), when)
 
     def high_words(self, target: Word, a: Word) -> None:
-        """target = the highest words of a."""
+        """Stores the highest words of a."""
         self._count(load=target.n_words, store=target.n_words)
         self._store(target, target.wrapped(self._value(a) >> (a.bits - target.bits)), None)
 
@@ -209,7 +209,7 @@ class ProcessorArray(LaneMachine):
         word.value = self._loop.shifted(word, offset)
 
     def accumulate(self, total: Word, a: Operand, when: Flag | None = None) -> None:
-        """total += a, also over the iterations of a loop."""
+        """Adds a to total, also over the iterations of a loop."""
         if self._loop is None:
             self.add(total, total, a, when)
             return
@@ -218,7 +218,7 @@ class ProcessorArray(LaneMachine):
         total.value = total.wrapped(self._loop.carry(total) + added).astype(total.dtype, copy=False)
 
     def keep(self, target: Word, a: Operand, when: Flag) -> None:
-        """target = a where the flag is set, also over the iterations of a loop."""
+        """Stores a where the flag is set, also over the iterations of a loop."""
         if self._loop is None:
             self.copy(target, a, when)
             return
@@ -235,14 +235,16 @@ class ProcessorArray(LaneMachine):
         self._store(target, padded, None)
 
     def fetch(self, target: Word, memory: ExternalMemory, column: Word, row: Word, active: slice) -> None:
-        """The input processor reads the pixel that each active element asks for; -1 outside of the picture."""
+        """The input processor reads the pixel that each active element asks for; -1 outside the picture."""
         columns, rows = self._value(column)[..., active], self._value(row)[..., active]
         self._cost.external_reads += columns.shape[-1] * (self._loop.n if self._loop else 1)
         value = np.full((*columns.shape[:-1], self.n), -1, np.int16)
         value[..., active] = memory.read(columns, rows)
         self._store(target, value, None)
 
-    def output(self, word: Word, memory: ExternalMemory, rows: Integer[np.ndarray, "..."] | np.integer) -> None:
+    def output(
+        self, word: Word, memory: ExternalMemory, rows: Integer[np.ndarray, "..."] | np.integer
+    ) -> None:
         """The digital output processor stores the first elements of a line in the external memory."""
         width = memory.pixels.shape[1]
         self._cost.external_writes += width * (self._loop.n if self._loop else 1)
@@ -264,4 +266,3 @@ class ProcessorArray(LaneMachine):
         values = self._value(word)[active].tolist()
         self._count(readout=len(values) * word.n_words)
         return values
-

@@ -109,8 +109,8 @@ class LaneMachine:
     def repeat(self, n: int) -> Iterator[int | Int[np.ndarray, "n 1"]]:
         """A loop of the control processor; yields its counter.
 
-        With batching, all iterations run at once on a leading axis. What one iteration leaves to the next must
-        go through `accumulate`, `shift` or `keep`.
+        With batching, all iterations run at once on a leading axis. What one leaves to the next must go
+        through `accumulate`, `shift` or `keep`.
 
         Raises:
             ValueError: An iteration reads what the one before has written.
@@ -129,7 +129,7 @@ class LaneMachine:
 
 
 def _chosen(when: Flag, value: Any, old: Lanes) -> Lanes:
-    """The value where the flag is set, else the old one: np.where, which is slow on long arrays of integers."""
+    """The value where the flag is set, else the old one; np.where is slow on long arrays of integers."""
     if old.dtype.kind == "f":
         return np.where(when, value, old)
     # old ⊕ ((old ⊕ value) ∧ mask)

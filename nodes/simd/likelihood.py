@@ -1,7 +1,7 @@
 """The observation of a network's smart camera on the processor array: bins and boxes in, distances out.
 
-A machine of fixed cycles cannot read boxes of any size: each box is sampled on the grid of the options, by the
-rule of `nodes.filtering.histogram`, so that the counts are equal to the last one.
+A machine of fixed cycles cannot read boxes of any size: each box is sampled on the grid of the options, by
+the rule of `nodes.counting.grid`, so that the counts are equal to the last one.
 """
 
 from dataclasses import dataclass
@@ -125,7 +125,9 @@ class SimdLikelihood:
                 pattern.scale[first:last],
                 float(perfect),
             )
-            for rows, (first, last), perfect in zip(slices, pairwise(pattern.ends), pattern.perfect, strict=True)
+            for rows, (first, last), perfect in zip(
+                slices, pairwise(pattern.ends), pattern.perfect, strict=True
+            )
         ]
 
 

@@ -1,8 +1,8 @@
 """Loops whose iterations all run at once: exactly what they would give one after the other.
 
 Words have a leading axis, one entry an iteration. What one iteration leaves to the next is known in closed
-form for three instructions: adding up, shifting along the array, and keeping the last flagged value. Any other
-word that an iteration reads and the one before has written is refused.
+form for three instructions: adding up, shifting along the array, and keeping the last flagged value. Any
+other word that an iteration reads and the one before has written is refused.
 """
 
 from typing import Any
@@ -27,7 +27,9 @@ class Loop:
     def read(self, word: Word) -> None:
         """Notes that an iteration reads a word."""
         if id(word) in self._carried:
-            raise ValueError(f"a word of {word.owner} is read in the loop that adds it up: read it afterwards")
+            raise ValueError(
+                f"a word of {word.owner} is read in the loop that adds it up: read it afterwards"
+            )
         if id(word) not in self._written:
             self._read[id(word)] = word
 
@@ -35,7 +37,8 @@ class Loop:
         """Notes that an iteration writes a word."""
         if id(word) in self._read or id(word) in self._carried:
             raise ValueError(
-                f"a word of {word.owner} is carried from one iteration to the next: use accumulate, shift or keep"
+                f"a word of {word.owner} is carried from one iteration to the next:"
+                " use accumulate, shift or keep"
             )
         self._written[id(word)] = word
 
@@ -75,7 +78,8 @@ class Loop:
         if self._last is None or self._last[0] is not when:
             # The highest iteration with a flag: the first one from the end.
             backwards = when[::-1]
-            self._last = (when, backwards.any(axis=0), self.n - 1 - backwards.argmax(axis=0))
+            found = np.asarray(backwards.any(axis=0))
+            self._last = (when, found, self.n - 1 - backwards.argmax(axis=0))
         _, found, iteration = self._last
         values = np.broadcast_to(value, when.shape)
         return np.where(found, values[iteration, np.arange(when.shape[1])], before)

@@ -1,4 +1,4 @@
-"""What can be chosen about the processor. The defaults are the IC3D's, as Medeiros et al. (2008) give them."""
+"""What can be chosen about the processor; the defaults are the IC3D's (Medeiros et al. 2008, section 4)."""
 
 from typing import Literal
 

@@ -1,7 +1,7 @@
-"""The frame pipeline: in the odd line intervals the picture is stored, in the even ones the last is worked on.
+"""The frame pipeline: in odd line intervals a picture is stored, in even ones the one before is worked on.
 
-Source: Medeiros et al. (2008), sections 3.5 and 4. Does a program hold the frame rate, and how much of each line
-interval is used? The estimate of a picture is ready one frame after it.
+Source: Medeiros et al. (2008), sections 3.5 and 4. Does a program hold the frame rate, and how much of each
+line interval is used? The estimate of a picture is ready one frame after it.
 """
 
 from collections.abc import Mapping

@@ -4,50 +4,23 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, UInt8
-from pydantic import Field, PositiveInt
 
-from network.options import Options
 from nodes.simd.array import ProcessorArray
 from nodes.simd.memory import ExternalMemory, Word
-from nodes.simd.options import SimdOptions
-from nodes.simd.programs.binning import BinningOptions, bin_picture
+from nodes.simd.programs.binning import bin_picture
 from nodes.simd.programs.counting import count_in_columns, region
 from nodes.simd.programs.motion import predict, seeds
 from nodes.simd.programs.normalizing import Group, add_up, normalized, scale_factor, weighted_mean
 from nodes.simd.programs.resampling import replicate, replication_bounds
 from nodes.simd.programs.weighing import Reference, add_coefficient, likelihood, reference
 from nodes.simd.report import FrameReport, Step
+from nodes.simd.tracker_options import TrackerOptions
 
 BESIDE_HISTOGRAMS = MappingProxyType({1: 22, 2: 29})
 """Words that the program needs for everything else, with numbers of one word or of two."""
-
-
-class TrackerOptions(Options):
-    """The tracker; its defaults are the paper's."""
-
-    simd: SimdOptions = SimdOptions()
-    binning: BinningOptions = BinningOptions()
-    n_particles: tuple[PositiveInt, ...] = (240,)
-    """Particles of each target; their sum must not exceed the processing elements."""
-    region_px: tuple[PositiveInt, PositiveInt] = (15, 15)
-    """Width and height of the region around a particle."""
-    shape: Literal["rectangle", "ellipse"] = "rectangle"
-    """Which pixels of it count."""
-    kernel: Literal["uniform", "epanechnikov"] = "uniform"
-    """Whether pixels near its border count less."""
-    histogram_words: PositiveInt | None = None
-    """Line memory for histograms; with fewer words than bins, the samples are read once for each part of the
-    histogram and the distance adds up. By default as many as there are, at most one a bin."""
-    process: tuple[float, float] = (1.0, 0.0)
-    """A and B of x(t+1) = A x(t) + B x(t-1) + n (Eq. 2), the same along both axes."""
-    noise_px: float = Field(default=4.0, gt=0)
-    """Standard deviation of n."""
-    sigma: float = Field(default=0.2, gt=0)
-    """σ of the likelihood exp(-d² / 2σ²)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,8 +71,9 @@ class SimdTracker:
         self._state = [array.number("Target state (current and previous)", 1) for _ in range(4)]
         self._weight = array.number("Particle weights")
         self._generator = array.word(n_words=2)
-        self._buffers = tuple(array.word("Video line buffers") for _ in range(3))
-        self._sampling = tuple(array.word() for _ in range(3))
+        red, green, blue = (array.word("Video line buffers") for _ in range(3))
+        self._buffers = (red, green, blue)
+        self._sampling = (array.word(), array.word(), array.word())
         free = options.simd.words - BESIDE_HISTOGRAMS[options.simd.number_words]
         n_words = options.histogram_words or min(options.binning.n_bins, max(free, 1))
         self._histogram = [array.word("Histograms") for _ in range(min(n_words, options.binning.n_bins))]
@@ -230,12 +204,12 @@ class SimdTracker:
                     self._sampling,
                     self._region,
                     self._active,
-                    first,
+                    first_bin=first,
                 )
             yield first, words
 
     def _compare(self, coefficient: Word) -> None:
-        """The coefficient of each particle's histogram with the reference, over all parts of the histogram."""
+        """The coefficient of each particle's histogram with the reference, part after part of it."""
         references = [target.reference for target in self._targets]
         starts = [target.group.first - self._active.start for target in self._targets]
         self.array.copy(coefficient, 0)
@@ -256,7 +230,7 @@ class SimdTracker:
                 array.copy(self._weight, weight, when=array.less(place, target.group.n))
 
     def _place_in(self, group: Group, place: Word) -> None:
-        """place = 0 to n - 1 in the elements of a group, and more than any n in the others."""
+        """Sets place to 0 to n - 1 in the elements of a group, and more than any n in the others."""
         array, outside = self.array, (1 << self.options.simd.bits) - 2
         array.subtract(place, self._place, group.first - self._active.start)
         array.copy(place, outside, when=array.at_least(place, group.n))

@@ -1,4 +1,4 @@
-"""`dcpf simd`: what a frame of the tracker costs on the emulated smart-camera processor, beside the paper's."""
+"""`dcpf simd`: what a frame of the tracker costs on the emulated processor, beside the paper's figures."""
 
 import json
 import sys
@@ -14,7 +14,8 @@ from rich.table import Table
 from network.streams import stream
 from nodes.simd.pipeline import LINE_INTERVAL_US, VGA_LINES
 from nodes.simd.report import PAPER_TOTAL_US, PAPER_US, PAPER_WORDS, FrameReport, Step
-from nodes.simd.tracker import SimdTracker, TrackerOptions
+from nodes.simd.tracker import SimdTracker
+from nodes.simd.tracker_options import TrackerOptions
 from sim.commands.shared import AsJson, split_overrides, yes_no
 from sim.scenario.complaints import validate
 from sim.scenario.document import Document
@@ -28,7 +29,9 @@ def simd(
     overrides: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="KEY=VALUE", help="Set an option of the tracker, such as simd.arithmetic=fixed20."
+            "--set",
+            metavar="KEY=VALUE",
+            help="Set an option of the tracker, such as simd.arithmetic=fixed20.",
         ),
     ] = None,
     out: Annotated[
@@ -128,7 +131,9 @@ def _print(report: FrameReport) -> None:
     for heading in ("paper", "counted", "ratio"):
         table.add_column(heading, justify="right")
     for name, counted in report.microseconds.items():
-        table.add_row(name, f"{PAPER_US[name]:.1f} µs", f"{counted:.1f} µs", f"{counted / PAPER_US[name]:.2f}")
+        table.add_row(
+            name, f"{PAPER_US[name]:.1f} µs", f"{counted:.1f} µs", f"{counted / PAPER_US[name]:.2f}"
+        )
     total = report.total_us
     table.add_section()
     table.add_row("Total", f"{PAPER_TOTAL_US:.0f} µs", f"{total:.0f} µs", f"{total / PAPER_TOTAL_US:.2f}")
@@ -144,7 +149,8 @@ def _print(report: FrameReport) -> None:
     laid_out = report.pipeline
     console.print(
         f"{report.cycles:,} cycles at {report.clock_mhz:g} MHz, {laid_out.share_of_frame:.0%} of a frame",
-        f"{laid_out.storing_lines} line intervals store, {laid_out.storing_us / LINE_INTERVAL_US:.0%} of each used",
+        f"{laid_out.storing_lines} line intervals store,"
+        f" {laid_out.storing_us / LINE_INTERVAL_US:.0%} of each used",
         f"{laid_out.reading_lines} read {laid_out.elements} elements each,"
         f" {laid_out.reading_us / LINE_INTERVAL_US:.0%} of each used; {laid_out.rest_lines} do the rest",
         f"holds 30 frames/s: {yes_no(laid_out.holds)} ({laid_out.lines} of {VGA_LINES} line intervals)",

@@ -19,7 +19,7 @@ COLORS = ("#0072B2", "#D55E00", "#009E73")
 def plot_line_intervals(pipeline: Pipeline, elements_stored: float, available: int) -> Figure:
     """How much of the line intervals of a frame is used.
 
-    Odd intervals store, even ones read and count while there are samples left; then comes the rest.
+    Odd intervals store, even ones read and count while there are samples left, and do the rest.
 
     Args:
         pipeline: The frame.
@@ -57,7 +57,8 @@ def plot_line_intervals(pipeline: Pipeline, elements_stored: float, available: i
 def _intervals(pipeline: Pipeline, elements_stored: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Phase, time and elements of each interval, stored and even ones in turn as long as there are both."""
     storing = np.zeros(pipeline.storing_lines, int)
-    working = np.repeat([1, 2], [pipeline.reading_lines, pipeline.rest_lines])
+    idle = max(pipeline.storing_lines - pipeline.reading_lines - pipeline.rest_lines, 0)
+    working = np.repeat([1, 2, 3], [pipeline.reading_lines, pipeline.rest_lines, idle])
     n_both = min(len(storing), len(working))
     interleaved = np.stack([storing[:n_both], working[:n_both]], axis=1).ravel()
     order = np.concatenate([interleaved, storing[n_both:], working[n_both:]])
@@ -65,7 +66,7 @@ def _intervals(pipeline: Pipeline, elements_stored: float) -> tuple[np.ndarray, 
     rest = np.full(pipeline.rest_lines, LINE_INTERVAL_US)
     if len(rest):
         rest[-1] = pipeline.rest_us - LINE_INTERVAL_US * (len(rest) - 1)
-    busy = np.choose(order, [pipeline.storing_us, pipeline.reading_us, 0.0])
+    busy = np.choose(order, [pipeline.storing_us, pipeline.reading_us, 0.0, 0.0])
     busy[order == 2] = rest
-    moved = np.choose(order, [elements_stored, float(pipeline.elements), 0.0])
+    moved = np.choose(order, [elements_stored, float(pipeline.elements), 0.0, 0.0])
     return order, busy, moved

@@ -8,7 +8,7 @@ from nodes.simd.memory import Word
 
 
 def divide(array: ProcessorArray, dividend: Word, divisor: Word) -> None:
-    """dividend = ⌊dividend / divisor⌋, by restoring division, one step for each bit of the dividend.
+    """Leaves ⌊dividend / divisor⌋ in the dividend, by restoring division, a step for each bit.
 
     The program memory is small and one routine serves the colours, the weights and the mean, so that it takes
     what all of them need: several words on both sides. What dividing by 0 gives means nothing.
@@ -17,7 +17,7 @@ def divide(array: ProcessorArray, dividend: Word, divisor: Word) -> None:
         array.real(dividend, _quotient, dividend, divisor)
         return
     with array.using(array.word(n_words=divisor.n_words)) as (remainder,):
-        # Shifted, it may have a bit more than the divisor: the carry, which the comparison takes into account.
+        # Shifted, it may have a bit more than the divisor: the carry, which the comparison heeds.
         remainder.bits += 1
         array.copy(remainder, 0)
         for _ in range(dividend.bits):
@@ -29,7 +29,7 @@ def divide(array: ProcessorArray, dividend: Word, divisor: Word) -> None:
 
 
 def square_root(array: ProcessorArray, root: Word, square: Word) -> None:
-    """root = ⌊√square⌋, bit by bit from the top: a bit stays where the root's square still fits.
+    """Stores ⌊√square⌋, bit by bit from the top: a bit stays where the root's square still fits.
 
     Args:
         array: The processor.
@@ -49,7 +49,7 @@ def square_root(array: ProcessorArray, root: Word, square: Word) -> None:
 
 
 def exponential(array: ProcessorArray, result: Word, exponent: Word, integer_bits: int) -> None:
-    """result = e^-exponent as a fraction of all ones: the product of e^-2^j over the bits of the exponent.
+    """Stores e^-exponent as a fraction of all ones: the product of e^-2^j over the bits of the exponent.
 
     The product is carried in one word more than the result, so that its roundings do not add up.
 
@@ -74,7 +74,9 @@ def exponential(array: ProcessorArray, result: Word, exponent: Word, integer_bit
         array.high_words(result, product)
 
 
-def _quotient(dividend: Float[np.ndarray, "..."], divisor: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+def _quotient(
+    dividend: Float[np.ndarray, "..."], divisor: Float[np.ndarray, "..."]
+) -> Float[np.ndarray, "..."]:
     return np.divide(dividend, divisor, out=np.zeros(dividend.shape), where=divisor != 0)
 
 

@@ -1,7 +1,7 @@
 """From the colours of a line to the bins of its pixels.
 
-The array holds a line of red, green and blue, one pixel an element, in three line buffers; the bins replace the
-first of them. Every statement runs for all pixels, whatever their colours.
+The array holds a line of red, green and blue, one pixel an element, in three line buffers; the bins replace
+the first of them. Every statement runs for all pixels, whatever their colours.
 """
 
 from typing import Literal
@@ -80,7 +80,7 @@ def bin_picture(
 
 
 def hue_bins(array: ProcessorArray, red: Word, green: Word, blue: Word, options: BinningOptions) -> None:
-    """red = the bin of the hue, or `bins` where saturation or value is too low for one (RGB to HSV)."""
+    """Puts the bin of the hue into red, or `bins` where saturation or value is too low for one."""
     value, spread = array.word(), array.word()
     dividend, divisor = array.word(n_words=2), array.word(n_words=2)
     with array.using(value, spread, dividend, divisor):
@@ -107,7 +107,7 @@ def hue_bins(array: ProcessorArray, red: Word, green: Word, blue: Word, options:
         array.multiply(dividend, dividend, options.bins)
         divide(array, dividend, divisor)
         array.copy(red, array.part(dividend, 0))
-        # S = C / V
+        # the saturation is C / V
         full = (1 << array.options.bits) - 1
         array.multiply(dividend, spread, full)
         array.copy(divisor, value)
@@ -131,7 +131,7 @@ def channel_bins(
 def joint_bins(
     array: ProcessorArray, red: Word, green: Word, blue: Word, n: int, gain: Float[np.ndarray, " 3"]
 ) -> None:
-    """red = r · n² + g · n + b (Truong & Kim, Eq. 10); gains in the order red, green, blue."""
+    """Puts r · n² + g · n + b (Truong & Kim, Eq. 10) into red; gains in the order red, green, blue."""
     channel_bins(array, (red, green, blue), n, gain)
     array.multiply(red, red, n)
     array.add(red, red, green)

@@ -1,9 +1,9 @@
 """Counting on a grid of samples in boxes of any size, and the distance to a reference, part by part.
 
-Source: Algorithm 2 of Medeiros et al. (2008) with the samples of `nodes.filtering.histogram`, and the distance
-of `nodes.filtering.appearance` computed recursively, as the paper's section 5 proposes: the coefficient grows
-by one bin after the other, so that no histogram has to be kept. As many bins as there are free words are
-counted in one reading of the samples.
+Source: Algorithm 2 of Medeiros et al. (2008) with the samples of `nodes.counting.grid`, and the distance of
+`nodes.filtering.pattern` computed recursively, as the paper's section 5 proposes: the coefficient grows by
+one bin after the other, so that no histogram has to be kept. As many bins as there are free words are counted
+in one reading of the samples.
 """
 
 import math
@@ -18,6 +18,7 @@ from nodes.simd.array import ProcessorArray
 from nodes.simd.memory import ExternalMemory, Word
 from nodes.simd.options import SimdOptions
 from nodes.simd.programs.arithmetic import divide, square_root
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
@@ -153,7 +154,10 @@ def count_part(
     channels, bins = part.channels[which], part.bins[which]
     for word in (*words, pixels):
         array.copy(word, 0)
-    position, column, row = array.word(n_words=2, real=True), *(array.word(n_words=2, signed=True) for _ in "xy")
+    position, column, row = (
+        array.word(n_words=2, real=True),
+        *(array.word(n_words=2, signed=True) for _ in "xy"),
+    )
     pixel, own = array.word("Video line buffers"), array.word()
     with array.using(position, column, row, pixel, own):
         for sample in array.repeat(len(part.rows)):
@@ -185,7 +189,7 @@ def _locate(
     memory: ExternalMemory,
     position: Word,
 ) -> None:
-    """Column and row of a sample, ⌊low + fraction · extent⌋; the border of the picture where it is outside."""
+    """Column and row of a sample, ⌊low + fraction · extent⌋; the picture's border where it is outside."""
     height, width = memory.pixels.shape
     axes = ((part.columns, boxes.left, boxes.width, width), (part.rows, boxes.top, boxes.height, height))
     for target, (fractions, low, extent, size) in zip(targets, axes, strict=True):
@@ -197,9 +201,15 @@ def _locate(
 
 
 def add_part(
-    array: ProcessorArray, coefficient: Word, words: Sequence[Word], which: slice, part: Part, scale: Scale, shift: int
+    array: ProcessorArray,
+    coefficient: Word,
+    words: Sequence[Word],
+    which: slice,
+    part: Part,
+    scale: Scale,
+    shift: int,
 ) -> None:
-    """coefficient += Σ W √n of some colours of a part."""
+    """Coefficient += Σ W √n of some colours of a part."""
     # W √(n / S) = √(n 2^s · W² / (S 2^s)), scaled
     squares = (scale.coefficient * part.weights[which]) ** 2 / (len(part.rows) * (1 << shift))
     root = array.number()
@@ -215,7 +225,7 @@ def add_part(
 
 
 def normalize_part(array: ProcessorArray, coefficient: Word, pixels: Word, n_samples: int) -> None:
-    """coefficient · √(samples / samples inside the picture): from shares of the grid to shares of what is seen.
+    """Multiplies the coefficient by √(samples / samples seen): from shares of the grid to shares of the seen.
 
     The root has four bits before the point: it saturates where less than 1/256 of the part is in the picture.
     """

@@ -50,7 +50,9 @@ def region(
     # k(r) = 1 - r², of the ellipse through the rectangle's corners if all of that counts
     falling = 1 - squared_radius / (1 if shape == "ellipse" else 2)
     weights = np.ceil(4 * falling).clip(1, 4) if kernel == "epanechnikov" else np.ones(len(columns))
-    return Region(*(axis[inside].astype(np.int32) for axis in (columns, rows, weights)), (width, height))
+    samples = (axis[inside].astype(np.int32) for axis in (columns, rows, weights))
+    columns, rows, weights = samples
+    return Region(columns, rows, weights, (width, height))
 
 
 def particles_in_columns(n_particles: int, n_elements: int, size_px: tuple[int, int]) -> bool:
@@ -68,6 +70,7 @@ def count_in_columns(
     sampling: tuple[Word, Word, Word],
     counted: Region,
     active: slice,
+    *,
     first_bin: int = 0,
 ) -> None:
     """Algorithm 2: each active element counts the bins from `first_bin` on in the region of one particle.
@@ -87,7 +90,8 @@ def count_in_columns(
         array.copy(word, 0)
     column, row, pixel = sampling
     columns, rows = (
-        offsets - size // 2 for offsets, size in zip((counted.columns, counted.rows), counted.size_px, strict=True)
+        offsets - size // 2
+        for offsets, size in zip((counted.columns, counted.rows), counted.size_px, strict=True)
     )
     alike = bool(np.all(counted.weights == 1))
     for sample in array.repeat(len(counted.columns)):

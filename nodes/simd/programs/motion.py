@@ -34,7 +34,7 @@ def seeds(array: ProcessorArray, rng: np.random.Generator) -> Int[np.ndarray, " 
 
 
 def gaussian(array: ProcessorArray, noise: Word, state: Word, standard_deviation: int) -> None:
-    """noise ~ N(0, σ²), from the sum of twelve uniform words.
+    """Noise ~ N(0, σ²), from the sum of twelve uniform words.
 
     Args:
         array: The processor.

@@ -46,10 +46,10 @@ def add_up(array: ProcessorArray, total: Word, value: Word, group: Group) -> Non
 
 
 def scale_factor(array: ProcessorArray, total: Word, group: Group) -> int | float:
-    """The factor that makes the weights add up to one, of two words more than a weight has bits after the point.
+    """The factor that makes the weights add up to one.
 
-    The control processor lets the array divide, reads the quotient of the group's first element and broadcasts
-    it: w / Σw = ⌊w · factor / 2^((2 n + 1) b)⌋ for weights of n words of b bits.
+    The control processor lets the array divide, reads the quotient of the group's first element and
+    broadcasts it: w / Σw = ⌊w · factor / 2^((2 n + 1) b)⌋ for weights of n words of b bits.
     """
     n_words = 2 * array.options.number_words + 1
     with array.using(array.number(n_words=n_words)) as (quotient,):
@@ -58,10 +58,8 @@ def scale_factor(array: ProcessorArray, total: Word, group: Group) -> int | floa
         return array.peek(quotient, group.first)
 
 
-def normalized(
-    array: ProcessorArray, result: Word, weight: Word, factor: int | float, extra_words: int
-) -> None:
-    """result = weight / Σ weights, as a fraction of the weights' words and `extra_words` more."""
+def normalized(array: ProcessorArray, result: Word, weight: Word, factor: float, extra_words: int) -> None:
+    """Stores weight / Σ weights, as a fraction of the weights' words and `extra_words` more."""
     n_words = array.options.number_words
     array.multiply(
         result, weight, factor, b_words=2 * n_words + 1, drop=0 if result.real else n_words + 1 - extra_words

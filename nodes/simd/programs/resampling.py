@@ -18,12 +18,12 @@ def replication_bounds(
     array: ProcessorArray,
     bounds: tuple[Word, Word],
     weight: Word,
-    factor: int | float,
+    factor: float,
     place: Word,
     group: Group,
     rng: np.random.Generator,
 ) -> None:
-    """start and end of each particle of the group, by the rule of the options.
+    """Start and end of each particle of the group, by the rule of the options.
 
     Args:
         array: The processor.
@@ -103,7 +103,7 @@ def _mask(array: ProcessorArray, bounds: tuple[Word, Word], place: Word, group: 
 
 
 def _prefix_sums(array: ProcessorArray, sums: Word, value: Word, group: Group) -> None:
-    """sums = the values of the group up to and with the own one."""
+    """Adds up the values of the group up to and with the own one."""
     with array.using(array.like(value)) as (moving,):
         array.copy(moving, value)
         array.copy(sums, value)
@@ -130,7 +130,9 @@ def _systematic(
         _prefix_sums(array, sums, fraction, group)
         array.multiply(scaled, sums, group.n)
         offset = rng.random()
-        array.add(scaled, scaled, offset if scaled.real else int(offset * (1 << n_words * array.options.bits)))
+        array.add(
+            scaled, scaled, offset if scaled.real else int(offset * (1 << n_words * array.options.bits))
+        )
         _whole(array, end, scaled)
         array.copy(end, group.n, when=array.equal(place, group.n - 1))
 
@@ -168,7 +170,7 @@ def _draw_rest(
     group: Group,
     rng: np.random.Generator,
 ) -> None:
-    """M - Σ r draws from what rounding has left of each weight; the control processor draws and broadcasts."""
+    """M - Σ r draws from what rounding left of each weight; the control processor draws and broadcasts."""
     sums, before, drawn = array.like(scaled), array.like(scaled), array.like(copies)
     with array.using(sums, before, drawn):
         # M w - r

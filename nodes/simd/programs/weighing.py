@@ -67,7 +67,7 @@ def add_coefficient(
     place: Word,
     starts: Sequence[int],
 ) -> None:
-    """coefficient += Σ √(h q) over the bins of a histogram, or of a part of it.
+    """Coefficient += Σ √(h q) over the bins of a histogram, or of a part of it.
 
     Args:
         array: The processor.
@@ -101,17 +101,15 @@ def _multiply_own(
     place: Word,
     starts: Sequence[int],
 ) -> None:
-    """product = count · q, of the reference of the element's own target."""
+    """Multiplies by q, of the reference of the element's own target."""
     with array.using(array.number()) as (own,):
         for reference_, start in zip(references, starts, strict=True):
             array.copy(own, reference_.scaled[bin_], when=array.at_least(place, start))
         array.multiply(product, count, own)
 
 
-def likelihood(
-    array: ProcessorArray, weight: Word, coefficient: Word, perfect: float, sigma: float
-) -> None:
-    """weight = exp(-d² / 2σ²) with d² = 1 - coefficient / perfect, not below 0.
+def likelihood(array: ProcessorArray, weight: Word, coefficient: Word, perfect: float, sigma: float) -> None:
+    """Stores exp(-d² / 2σ²) with d² = 1 - coefficient / perfect, not below 0.
 
     The exponent saturates at 8 (one word) or 16, where the likelihood is less than its last bit.
     """
@@ -134,4 +132,3 @@ def likelihood(
             array.minimum(wide, wide, full)
             array.copy(exponent, wide)
         exponential(array, weight, exponent, integer_bits)
-
