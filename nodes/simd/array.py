@@ -7,11 +7,12 @@ its values, the carry staying in the element. Values wrap around in the bits of 
 """
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Int, Integer, Num
 
-from nodes.simd.lanes import Flag, LaneMachine, Lanes, Operand
+from nodes.simd.lanes import Flag, LaneMachine, Lanes, Operand, Scalar
 from nodes.simd.memory import ExternalMemory, Word
 
 
@@ -138,7 +139,7 @@ class ProcessorArray(LaneMachine):
 
     # Flags
 
-    def _compare(self, a: Operand, b: Operand) -> tuple[Lanes, Lanes]:
+    def _compare(self, a: Operand, b: Operand) -> tuple[Any, Any]:
         n = max(x.n_words if isinstance(x, Word) else 1 for x in (a, b))
         self._count(load=n, operate=n)
         return self._value(a), self._value(b)
@@ -238,8 +239,9 @@ class ProcessorArray(LaneMachine):
         """The input processor reads the pixel that each active element asks for; -1 outside the picture."""
         columns, rows = self._value(column)[..., active], self._value(row)[..., active]
         self._cost.external_reads += columns.shape[-1] * (self._loop.n if self._loop else 1)
-        value = np.full((*columns.shape[:-1], self.n), -1, np.int16)
-        value[..., active] = memory.read(columns, rows)
+        pixels = memory.read(columns, rows)
+        value = np.full((*pixels.shape[:-1], self.n), -1, pixels.dtype)
+        value[..., active] = pixels
         self._store(target, value, None)
 
     def output(
@@ -256,12 +258,12 @@ class ProcessorArray(LaneMachine):
         self._cost.external_writes += values.shape[-1] * (self._loop.n if self._loop else 1)
         return values
 
-    def peek(self, word: Word, element: int) -> int | float:
+    def peek(self, word: Word, element: int) -> Scalar:
         """The control processor reads the word of one element."""
         self._count(readout=word.n_words)
         return self._value(word)[element].item()
 
-    def scan(self, word: Word, active: slice) -> Sequence[int | float]:
+    def scan(self, word: Word, active: slice) -> Sequence[Scalar]:
         """A line passes by the control processor, one element after the other."""
         values = self._value(word)[active].tolist()
         self._count(readout=len(values) * word.n_words)

@@ -14,7 +14,9 @@ from nodes.simd.options import SimdOptions
 
 Lanes = Num[np.ndarray, "..."]
 Flag = Bool[np.ndarray, "..."]
-Operand = Word | int | float | Lanes
+Scalar = int | float
+"""A number that the control processor knows: whole in fixed point."""
+Operand = Word | int | float | np.number | Lanes
 """A word, or an immediate value (one for each iteration of a loop that runs all at once)."""
 
 
@@ -87,7 +89,8 @@ class LaneMachine:
 
     def _value(self, operand: Operand) -> Any:
         if not isinstance(operand, Word):
-            return operand
+            # as a Python number, a scalar leaves the lanes as narrow as they are
+            return operand.item() if isinstance(operand, np.generic) else operand
         if self._loop:
             self._loop.read(operand)
         return operand.value
@@ -133,7 +136,6 @@ def _chosen(when: Flag, value: Any, old: Lanes) -> Lanes:
     if old.dtype.kind == "f":
         return np.where(when, value, old)
     # old ⊕ ((old ⊕ value) ∧ mask)
-    changed = np.negative(when.view(np.int8), dtype=old.dtype)
-    changed &= old ^ value
+    changed = (old ^ value) & np.negative(when.view(np.int8), dtype=old.dtype)
     changed ^= old
     return changed

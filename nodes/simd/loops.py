@@ -49,9 +49,10 @@ class Loop:
         self._carried[id(word)] = word
         return word.value
 
-    def total(self, value: Any, when: Bool[np.ndarray, "n P"] | None) -> Any:
+    def total(self, value: Any, when: Bool[np.ndarray, "..."] | None) -> Any:
         """The sum over the iterations, of those whose flag is set."""
         if when is not None:
+            when = np.broadcast_to(when, (self.n, when.shape[-1]))
             if np.ndim(value) == 0:
                 # the same in each: count the flags, in the smallest integers that can
                 smallest = np.min_scalar_type(self.n)
@@ -72,17 +73,17 @@ class Loop:
         return windows[-2::-1]
 
     def last(
-        self, before: Num[np.ndarray, "..."], value: Any, when: Bool[np.ndarray, "n P"]
+        self, before: Num[np.ndarray, "..."], value: Any, when: Bool[np.ndarray, "..."]
     ) -> Num[np.ndarray, " P"]:
         """The value of the last iteration whose flag is set, else what was there before."""
         if self._last is None or self._last[0] is not when:
             # The highest iteration with a flag: the first one from the end.
-            backwards = when[::-1]
+            backwards = np.broadcast_to(when, (self.n, when.shape[-1]))[::-1]
             found = np.asarray(backwards.any(axis=0))
             self._last = (when, found, self.n - 1 - backwards.argmax(axis=0))
         _, found, iteration = self._last
-        values = np.broadcast_to(value, when.shape)
-        return np.where(found, values[iteration, np.arange(when.shape[1])], before)
+        values = np.broadcast_to(value, (self.n, len(before)))
+        return np.where(found, values[iteration, np.arange(len(before))], before)
 
     def finish(self) -> None:
         """Leaves in every word what the last iteration has left."""

@@ -118,7 +118,5 @@ class ExternalMemory:
     ) -> Integer[np.ndarray, "..."]:
         """The bins at these places, -1 where they are outside."""
         height, width = self._bordered.shape
-        index = np.minimum(np.maximum(rows + 1, 0), height - 1)
-        index *= width
-        index += np.minimum(np.maximum(columns + 1, 0), width - 1)
-        return self._bordered.take(index)
+        starts = np.minimum(np.maximum(rows + 1, 0), height - 1) * width
+        return self._bordered.take(starts + np.minimum(np.maximum(columns + 1, 0), width - 1))

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int, Integer
 
 from nodes.simd.array import ProcessorArray
+from nodes.simd.lanes import Scalar
 from nodes.simd.memory import ExternalMemory, Word
 from nodes.simd.options import SimdOptions
 from nodes.simd.programs.arithmetic import divide, square_root
@@ -70,7 +71,7 @@ class Scale:
     shifts: tuple[int, ...]
     one: int
 
-    def held(self, value: float) -> int | float:
+    def held(self, value: float) -> Scalar:
         """A coefficient as a number."""
         return value if self.one == 1 else round(value * self.coefficient)
 
@@ -97,9 +98,8 @@ def scale_of(parts: Sequence[Part], options: SimdOptions) -> Scale:
 
 
 def words_for_distance(options: SimdOptions) -> int:
-    """Words that counting, or adding up and normalising the coefficient, takes beside what is allocated."""
-    n_words = options.number_words
-    return max(7, 7 * n_words)
+    """Words that counting, or adding up the coefficient, takes beside the counts."""
+    return max(8, 6 * options.number_words)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

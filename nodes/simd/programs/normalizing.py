@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from nodes.simd.array import ProcessorArray
+from nodes.simd.lanes import Scalar
 from nodes.simd.memory import Word
 from nodes.simd.programs.arithmetic import divide
 
@@ -45,7 +44,7 @@ def add_up(array: ProcessorArray, total: Word, value: Word, group: Group) -> Non
             array.accumulate(total, moving)
 
 
-def scale_factor(array: ProcessorArray, total: Word, group: Group) -> int | float:
+def scale_factor(array: ProcessorArray, total: Word, group: Group) -> Scalar:
     """The factor that makes the weights add up to one.
 
     The control processor lets the array divide, reads the quotient of the group's first element and
@@ -58,7 +57,7 @@ def scale_factor(array: ProcessorArray, total: Word, group: Group) -> int | floa
         return array.peek(quotient, group.first)
 
 
-def normalized(array: ProcessorArray, result: Word, weight: Word, factor: float, extra_words: int) -> None:
+def normalized(array: ProcessorArray, result: Word, weight: Word, factor: Scalar, extra_words: int) -> None:
     """Stores weight / Σ weights, as a fraction of the weights' words and `extra_words` more."""
     n_words = array.options.number_words
     array.multiply(
@@ -66,9 +65,7 @@ def normalized(array: ProcessorArray, result: Word, weight: Word, factor: float,
     )
 
 
-def weighted_mean(
-    array: ProcessorArray, weight: Word, coordinate: Word, total: Word, group: Group
-) -> int | float:
+def weighted_mean(array: ProcessorArray, weight: Word, coordinate: Word, total: Word, group: Group) -> Scalar:
     """Σ w x / Σ w, by one more shift and accumulate and a division."""
     n_words = array.options.number_words
     product, moment = array.number(n_words=n_words + 1), array.number(n_words=n_words + 2)
@@ -77,8 +74,3 @@ def weighted_mean(
         add_up(array, moment, product, group)
         divide(array, moment, total)
         return array.peek(moment, group.first)
-
-
-def effective_sample_size(weights: np.ndarray) -> float:
-    """(Σw)² / Σw², of weights that need not be normalised."""
-    return float(weights.sum() ** 2 / np.square(weights).sum())

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nodes.simd.array import ProcessorArray
+from nodes.simd.lanes import Scalar
 from nodes.simd.memory import Word
 from nodes.simd.programs.normalizing import Group, normalized
 
@@ -18,7 +19,7 @@ def replication_bounds(
     array: ProcessorArray,
     bounds: tuple[Word, Word],
     weight: Word,
-    factor: float,
+    factor: Scalar,
     place: Word,
     group: Group,
     rng: np.random.Generator,
@@ -43,9 +44,11 @@ def replication_bounds(
             _systematic(array, end, fraction, place, group, rng)
         else:
             _residual(array, end, fraction, weight, place, group, rng)
-    # start is the end of the particle before
+    # start is the end of the particle before; elements of other groups have none to give: start = M, end = 0
+    outside = array.at_least(place, group.n)
+    array.copy(end, 0, when=outside)
     array.copy(start, array.neighbour(end, -1))
-    _mask(array, bounds, place, group)
+    array.copy(start, group.n, when=outside)
 
 
 def replicate(
@@ -93,13 +96,6 @@ def _hand_on(
         mine = array.at_least(mark, limit)
         for result, each in zip(results, moving, strict=True):
             array.keep(result, each, mine)
-
-
-def _mask(array: ProcessorArray, bounds: tuple[Word, Word], place: Word, group: Group) -> None:
-    # Elements of other groups have no particles to give: start = M, end = 0.
-    outside = array.at_least(place, group.n)
-    array.copy(bounds[0], group.n, when=outside)
-    array.copy(bounds[1], 0, when=outside)
 
 
 def _prefix_sums(array: ProcessorArray, sums: Word, value: Word, group: Group) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from nodes.simd.array import ProcessorArray
+from nodes.simd.lanes import Scalar
 from nodes.simd.memory import Word
 from nodes.simd.options import SimdOptions
 from nodes.simd.programs.arithmetic import exponential, square_root
@@ -31,7 +32,7 @@ class Reference:
 
     scaled: Int[np.ndarray, " B"] | Float[np.ndarray, " B"]
     shift: int
-    perfect: float
+    perfect: Scalar
 
 
 def reference(counts: Int[np.ndarray, " B"], region_total: int, options: SimdOptions) -> Reference:
@@ -103,12 +104,13 @@ def _multiply_own(
 ) -> None:
     """Multiplies by q, of the reference of the element's own target."""
     with array.using(array.number()) as (own,):
-        for reference_, start in zip(references, starts, strict=True):
-            array.copy(own, reference_.scaled[bin_], when=array.at_least(place, start))
+        array.copy(own, references[0].scaled[bin_])
+        for other, start in zip(references[1:], starts[1:], strict=True):
+            array.copy(own, other.scaled[bin_], when=array.at_least(place, start))
         array.multiply(product, count, own)
 
 
-def likelihood(array: ProcessorArray, weight: Word, coefficient: Word, perfect: float, sigma: float) -> None:
+def likelihood(array: ProcessorArray, weight: Word, coefficient: Word, perfect: Scalar, sigma: float) -> None:
     """Stores exp(-d² / 2σ²) with d² = 1 - coefficient / perfect, not below 0.
 
     The exponent saturates at 8 (one word) or 16, where the likelihood is less than its last bit.
