@@ -1,27 +1,26 @@
 """Colours: from pixels to histogram bins, with the camera's gain taken out.
 
 Sources: Jing & Chen, Eq. 7-8 (a histogram of each channel); Truong & Kim (2017), Eq. 10 (joint RGB); Medeiros
-et al. (2008), section 4 (hue), with the colour-free pixels of Pérez et al. (2002) in a bin of their own.
+et al. (2008), section 4 (hue).
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Integer, UInt8
+from jaxtyping import Float, Int, Integer, UInt8
 from pydantic import Field, model_validator
 
 from network.options import Options
+from nodes.counting.compiled import Coding
+from nodes.filtering.hue import hue_bins
 
 GAIN_GRID_PX = 24
 """Every 24th pixel of every 24th line is enough for a median."""
 MAX_RGB_BINS = 16
 """Most bins along a channel of RGB."""
-GREY_CHROMA = 16
-"""max - min of red, green and blue below which a pixel counts as grey, whatever its brightness."""
-GREY_SATURATION = 8
-"""It counts as grey, too, where max - min is below max / 8."""
 _VALUES = np.arange(256)
 
 
@@ -122,14 +121,47 @@ def quantize(
     if options.space == "hue":
         return hue_bins(_without_gain(image, gain), options.n_bins)[None]
     n = options.bins_per_channel
+    if 256 % n == 0 and np.all(gain == 1.0):
+        # floor(n · value / 256) without a table
+        values = np.right_shift(image, 8 - (n - 1).bit_length())
+        if options.space == "joint_rgb":
+            blue, green, red = cv2.split(values)
+            dtype = np.uint8 if options.n_bins <= 256 else np.uint16
+            return (red.astype(dtype) * dtype(n * n) + green.astype(dtype) * dtype(n) + blue)[None]
+    else:
+        tables = _tables(options, gain).astype(np.uint8 if options.n_bins <= 256 else np.uint16)
+        values = cv2.LUT(image, np.ascontiguousarray(tables.T)[None])
+        if options.space == "joint_rgb":
+            blue, green, red = cv2.split(values)
+            return (red + green + blue)[None]
+    # side by side in memory, four bytes a pixel, as counting wants them
+    return np.moveaxis(cv2.cvtColor(values, cv2.COLOR_BGR2RGBA), -1, 0)[:3]
+
+
+def _tables(options: ColorOptions, gain: Float[np.ndarray, " 3"]) -> Int[np.ndarray, "3 256"]:
+    """The bin of each value of blue, green and red; in `joint_rgb` what each adds to the joint bin."""
+    n = options.bins_per_channel
     # bin = floor(n · value / 256), of the value without its gain
-    values = _VALUES / gain[:, None]
-    dtype = np.uint8 if options.n_bins <= 256 else np.uint16
-    bins = np.minimum(values * n / 256, n - 1).astype(dtype)
-    if options.space == "joint_rgb":
-        bins *= np.array([[1], [n], [n * n]], dtype)
-    blue, green, red = cv2.split(cv2.LUT(image, np.ascontiguousarray(bins.T)[None]))
-    return np.stack([red, green, blue]) if options.space == "rgb" else (red + green + blue)[None]
+    bins = np.minimum(_VALUES * (n / 256) / gain[:, None], n - 1).astype(np.intp)
+    return bins if options.space == "rgb" else bins * _digits(n)
+
+
+def _digits(n: int) -> Int[np.ndarray, "3 1"]:
+    """What blue, green and red count for in a number of three digits to the base n."""
+    return np.array([[1], [n], [n * n]])
+
+
+def coding(options: ColorOptions, gain: Float[np.ndarray, " 3"]) -> Coding:
+    """The joint index of a pixel for the compiled kernel: its digits are the bins of red, green and blue."""
+    return _coding(options, gain.tobytes())
+
+
+@lru_cache(maxsize=64)
+def _coding(options: ColorOptions, gain: bytes) -> Coding:
+    tables = _tables(options, np.frombuffer(gain))
+    if options.space == "rgb":
+        tables = tables * _digits(options.bins_per_channel)
+    return Coding(tables.astype(np.uint16))
 
 
 def _without_gain(
@@ -140,35 +172,3 @@ def _without_gain(
         return image
     levels = np.minimum(np.rint(_VALUES / gain[:, None]), 255).astype(np.uint8)
     return np.asarray(cv2.LUT(image, np.ascontiguousarray(levels.T)[None]), dtype=np.uint8)
-
-
-def hue_bins(image: UInt8[np.ndarray, "H W 3"], n_bins: int) -> UInt8[np.ndarray, "H W"]:
-    """The hue of every pixel in n - 1 equal sectors of the colour circle, or n - 1 for grey.
-
-    All integers, so that a processor without fractions finds the same bins. With M the largest and m the
-    smallest of r, g, b, and C = M - m:
-
-    1. grey, bin n - 1, if C < 16 or 8 C < M;
-    2. otherwise the hue in units of 60 degrees / C, from 0 (red) to below 6 C:
-       H = g - b if M = r; else H = 2 C + b - r if M = g; else H = 4 C + r - g; and H + 6 C if H < 0;
-    3. bin = (n - 1) H // (6 C): floor of the quotient; the product stays below 2^16 up to 40 bins.
-
-    Where two channels are both largest, either line of 2 gives the same H. Hue is OpenCV's
-    (``cv2.COLOR_BGR2HSV``), there rounded to whole 2 degrees.
-
-    Args:
-        image: Blue, green, red.
-        n_bins: n, at most 256.
-    """
-    blue, green, red = cv2.split(image)
-    largest = cv2.max(cv2.max(blue, green), red)
-    chroma = np.asarray(cv2.subtract(largest, cv2.min(cv2.min(blue, green), red)), dtype=np.int16)
-    b, g, r, M = (channel.astype(np.int16) for channel in (blue, green, red, largest))
-    H = np.where(r == M, g - b, np.where(g == M, 2 * chroma + b - r, 4 * chroma + r - g))
-    H += 6 * chroma * (H < 0)
-    # In float32 the quotient's floor is exact: it is at least 1 / (6 C) away from the next whole number
-    # below which it could be rounded up, and the numbers are below 2^24.
-    sector = (H.astype(np.float32) * (n_bins - 1) / (6 * np.maximum(chroma, 1))).astype(np.uint8)
-    grey = (chroma < GREY_CHROMA) | (GREY_SATURATION * chroma < M)
-    sector[grey] = n_bins - 1
-    return sector
