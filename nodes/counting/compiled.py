@@ -60,7 +60,7 @@ class Coding:
     Attributes:
         tables: What blue, green and red add to it.
         hue_bins: If above 0, the index is the bin of the hue instead.
-        grey_chroma, grey_saturation: Which pixels have no hue; see `nodes.filtering.color.hue_bins`.
+        grey_chroma, grey_saturation: Which pixels have no hue; see `nodes.filtering.hue.hue_bins`.
     """
 
     tables: UInt16[np.ndarray, "3 256"]

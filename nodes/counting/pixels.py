@@ -95,8 +95,8 @@ def _from_integrals(
     integrals = np.empty((at_once * n_rows + 1, width + 1, PLACES), np.int32)
     for images in of_part:
         pixels, n_images = _numbers(bins[:, first_row:last_row], images.block), len(images.numbers)
-        rows = np.repeat(images.numbers.view(np.uint32), width)
-        rows = rows.view(np.uint8).reshape(n_images, 1, width * PLACES)
+        fours = np.repeat(images.numbers.view(np.uint32), width)
+        rows = fours.view(np.uint8).reshape(n_images, 1, width * PLACES)
         found = np.empty((n_images, 4, n_boxes), np.complex128)
         for first in range(0, n_images, at_once):
             n = min(at_once, n_images - first)
@@ -104,8 +104,8 @@ def _from_integrals(
             marked = planes[:n].view(np.uint8).reshape(n * n_rows, width, PLACES)
             # four sums side by side are one entry of 16 bytes
             entries = cv2.integral(marked, integrals[: n * n_rows + 1]).view(np.complex128).ravel()
-            entries = entries[: n * n_rows * (width + 1)].reshape(n, -1)
-            entries.take(corners, axis=1, mode="clip", out=found[first : first + n])
+            by_image = entries[: n * n_rows * (width + 1)].reshape(n, -1)
+            by_image.take(corners, axis=1, mode="clip", out=found[first : first + n])
         sums = found.view(np.int32).reshape(n_images, 4, n_boxes * PLACES)
         total = sums[:, 0] + sums[:, 1] - sums[:, 2] - sums[:, 3]
         counts[images.codes] = total.reshape(n_images, n_boxes, PLACES).swapaxes(1, 2)

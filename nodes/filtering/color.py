@@ -1,7 +1,7 @@
 """Colours: from pixels to histogram bins, with the camera's gain taken out.
 
 Sources: Jing & Chen, Eq. 7-8 (a histogram of each channel); Truong & Kim (2017), Eq. 10 (joint RGB); Medeiros
-et al. (2008), section 4 (hue).
+et al. (2008), section 4 (hue), with the colour-free pixels of Pérez et al. (2002) in a bin of their own.
 """
 
 from dataclasses import dataclass
@@ -15,13 +15,14 @@ from pydantic import Field, model_validator
 
 from network.options import Options
 from nodes.counting.compiled import Coding
-from nodes.filtering.hue import hue_bins
+from nodes.filtering.hue import GREY_CHROMA, GREY_SATURATION, MAX_BINS, hue_bins
 
 GAIN_GRID_PX = 24
 """Every 24th pixel of every 24th line is enough for a median."""
 MAX_RGB_BINS = 16
 """Most bins along a channel of RGB."""
 _VALUES = np.arange(256)
+_NO_TABLES = np.zeros((3, 256), np.uint16)
 
 
 class ColorOptions(Options):
@@ -30,9 +31,9 @@ class ColorOptions(Options):
     space: Literal["rgb", "joint_rgb", "hue"] = "rgb"
     """`rgb`: a histogram of each channel (Eq. 7-8); `joint_rgb`: one of the three together; `hue`: one of the
     hue alone, with a last bin for what is too grey to have one."""
-    bins_per_channel: int = Field(default=8, ge=2, le=256)
-    """Bins along each channel, at most 16 in RGB: 8 make 3 x 8 bins in `rgb`, 512 in `joint_rgb`, in `hue` 7
-    sectors of the colour circle and one for grey."""
+    bins_per_channel: int = Field(default=8, ge=2)
+    """Bins along each channel, at most 16 in RGB and 64 of the hue: 8 make 3 x 8 bins in `rgb`, 512 in
+    `joint_rgb`, in `hue` 7 sectors of the colour circle and one for grey."""
     parts: tuple[float, ...] = (1.0,)
     """Heights of the target's parts from top to bottom, as fractions that add up to 1; each has its own
     histogram."""
@@ -44,10 +45,11 @@ class ColorOptions(Options):
     """Whether each channel's gain is brought back to that of the camera's first picture."""
 
     @model_validator(mode="after")
-    def _rgb_has_few_bins(self) -> "ColorOptions":
-        if self.space != "hue" and self.bins_per_channel > MAX_RGB_BINS:
+    def _not_too_many_bins(self) -> "ColorOptions":
+        most = MAX_BINS if self.space == "hue" else MAX_RGB_BINS
+        if self.bins_per_channel > most:
             raise ValueError(
-                f"bins_per_channel is {self.bins_per_channel}: in {self.space} take at most {MAX_RGB_BINS}"
+                f"bins_per_channel is {self.bins_per_channel}: in {self.space} take at most {most}"
             )
         return self
 
@@ -119,7 +121,7 @@ def quantize(
         r·n² + g·n + b for n bins a channel (Truong & Kim, Eq. 10); in `hue` those of `hue_bins`.
     """
     if options.space == "hue":
-        return hue_bins(_without_gain(image, gain), options.n_bins)[None]
+        return hue_bins(without_gain(image, gain), options.n_bins)[None]
     n = options.bins_per_channel
     if 256 % n == 0 and np.all(gain == 1.0):
         # floor(n · value / 256) without a table
@@ -158,13 +160,15 @@ def coding(options: ColorOptions, gain: Float[np.ndarray, " 3"]) -> Coding:
 
 @lru_cache(maxsize=64)
 def _coding(options: ColorOptions, gain: bytes) -> Coding:
+    if options.space == "hue":
+        return Coding(_NO_TABLES, options.n_bins, GREY_CHROMA, GREY_SATURATION)
     tables = _tables(options, np.frombuffer(gain))
     if options.space == "rgb":
         tables = tables * _digits(options.bins_per_channel)
     return Coding(tables.astype(np.uint16))
 
 
-def _without_gain(
+def without_gain(
     image: UInt8[np.ndarray, "H W 3"], gain: Float[np.ndarray, " 3"]
 ) -> UInt8[np.ndarray, "H W 3"]:
     """The picture with each channel's gain divided out, rounded to grey levels."""

@@ -1,7 +1,6 @@
-"""Hue, in whole numbers: the same bins on a processor without fractions, to the last pixel.
+"""Hue in equal sectors of the colour circle, by integers that any processor can follow.
 
-Sources: Medeiros et al. (2008), section 4, track by a hue histogram; Pérez et al. (2002) give the pixels that
-are too grey to have a hue bins of their own.
+Source: Medeiros et al. (2008), section 4; what has no colour has a bin of its own, as in Pérez et al. (2002).
 """
 
 import cv2
@@ -12,6 +11,11 @@ GREY_CHROMA = 16
 """max - min of red, green and blue below which a pixel counts as grey, whatever its brightness."""
 GREY_SATURATION = 8
 """It counts as grey, too, where max - min is below max / 8."""
+NUDGE = 0.002
+"""Degrees added before sectors are cut: more than the error of 32-bit floats, less than the smallest distance
+of a hue from the sector's end above it, 360 / (6 · 255 (n - 1))."""
+MAX_BINS = 64
+"""Up to here, the nudge is small enough."""
 
 
 def hue_bins(image: UInt8[np.ndarray, "H W 3"], n_bins: int) -> UInt8[np.ndarray, "H W"]:
@@ -26,21 +30,19 @@ def hue_bins(image: UInt8[np.ndarray, "H W 3"], n_bins: int) -> UInt8[np.ndarray
     3. bin = (n - 1) H // (6 C): floor of the quotient; the product stays below 2^16 up to 40 bins.
 
     Where two channels are both largest, either line of 2 gives the same H. Hue is OpenCV's
-    (``cv2.COLOR_BGR2HSV``), there rounded to whole 2 degrees.
+    (``cv2.COLOR_BGR2HSV``), there rounded to whole 2 degrees; here OpenCV works it out in floats, faster than
+    NumPy in integers, and the bins come out the same for each of the 2^24 colours.
 
     Args:
         image: Blue, green, red.
-        n_bins: n, at most 256.
+        n_bins: n, at most `MAX_BINS`.
     """
-    blue, green, red = cv2.split(image)
-    largest = cv2.max(cv2.max(blue, green), red)
-    chroma = np.asarray(cv2.subtract(largest, cv2.min(cv2.min(blue, green), red)), dtype=np.int16)
-    b, g, r, M = (channel.astype(np.int16) for channel in (blue, green, red, largest))
-    H = np.where(r == M, g - b, np.where(g == M, 2 * chroma + b - r, 4 * chroma + r - g))
-    H += 6 * chroma * (H < 0)
-    # In float32 the quotient's floor is exact: it is at least 1 / (6 C) away from the next whole number
-    # below which it could be rounded up, and the numbers are below 2^24.
-    sector = (H.astype(np.float32) * (n_bins - 1) / (6 * np.maximum(chroma, 1))).astype(np.uint8)
-    grey = (chroma < GREY_CHROMA) | (GREY_SATURATION * chroma < M)
+    hue, saturation, value = cv2.split(cv2.cvtColor(image.astype(np.float32), cv2.COLOR_BGR2HSV))
+    hue += NUDGE
+    hue *= (n_bins - 1) / 360
+    sector = hue.astype(np.uint8)
+    # C = S M, and 8 C < M where S < 1/8; the numbers in between are whole, or far away
+    chroma = np.multiply(saturation, value, out=value)
+    grey = (chroma < GREY_CHROMA - 0.5) | (saturation < 1 / GREY_SATURATION - 1e-5)
     sector[grey] = n_bins - 1
     return sector

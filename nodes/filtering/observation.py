@@ -184,8 +184,7 @@ class ObservationModel:
     ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
         visible = visible_fraction(boxes, self.camera)
         pattern = pattern_of(appearance, self.options.color)
-        # a hue is no sum of tables of red, green and blue, which is all that the compiled kernel reads
-        if self.options.backend == "compiled" and self.options.color.space != "hue":
+        if self.options.backend == "compiled":
             sampling = self.options.sampling
             _, pixels, coefficient = count_compiled(
                 picture.image,

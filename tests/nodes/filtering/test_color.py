@@ -60,7 +60,7 @@ def hue_bin(red, green, blue, n):
     return (n - 1) * (hue % (6 * chroma)) // (6 * chroma)
 
 
-@given(seeds, st.sampled_from([2, 3, 19, 40, 128, 256]))
+@given(seeds, st.sampled_from([2, 3, 19, 40, 64]))
 def test_hue_bins_are_those_of_integer_arithmetic(seed, n):
     image = random_image(seed)
     image[:4] = image[:4] // 9 * 9  # with many ties
