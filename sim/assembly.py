@@ -1,7 +1,7 @@
 """Puts a run together: from a resolved scenario to the nodes, their pictures and the truth."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,10 +12,13 @@ from network.graph import Graph
 from network.messages import TruthMessage, Visibility
 from network.streams import stream
 from network.transport import Links, links_of
+from nodes.array_estimator import ArrayEstimator
 from nodes.camera import Camera
 from nodes.central import Central
+from nodes.estimator import SirEstimator
 from nodes.filtering.observation import ObservationModel
 from nodes.setup import Start, TrackingSetup
+from nodes.simd.likelihood import SimdLikelihood
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
 from sim.scenario.loading import cameras_of, video_source
@@ -140,18 +143,47 @@ class Assembly:
         )
 
     def model(self, camera: str) -> ObservationModel:
-        """The observation model of a camera."""
+        """The observation model of a camera, on the machine that this is."""
         return ObservationModel(self.cameras[camera], self.scenario.target, self.scenario.filter)
+
+    def model_on_camera(self, camera: str) -> ObservationModel:
+        """The observation model of a camera on its own processor.
+
+        Raises:
+            ScenarioError: The processor cannot do what the options ask for.
+        """
+        model, options = self.model(camera), self.scenario.filter
+        if options.backend != "simd":
+            return model
+        try:
+            return replace(model, processor=SimdLikelihood(options.simd, options.color, options.sampling))
+        except ValueError as error:
+            raise ScenarioError(f"{self.scenario.name}: filter.backend is simd, and {error}") from error
+
+    def single(self, camera: str) -> SirEstimator | ArrayEstimator | None:
+        """A camera's filter on its own, if it is asked for; in the image plane wholly on its processor.
+
+        Raises:
+            ScenarioError: The processor cannot do what the options ask for.
+        """
+        if not self.scenario.baselines.single:
+            return None
+        if self.scenario.filter.backend != "simd" or self.scenario.target.space != "image":
+            return SirEstimator(camera, "single", self.setup)
+        try:
+            return ArrayEstimator(camera, self.setup)
+        except ValueError as error:
+            raise ScenarioError(f"{self.scenario.name}: filter.backend is simd, and {error}") from error
 
     def smart_camera(self, name: str) -> SmartCamera:
         """A camera's node."""
         network, neighbors = self.scenario.network, self.links[name].neighbors
         return SmartCamera(
-            self.model(name),
+            self.model_on_camera(name),
             self.setup,
             Consensus(name, neighbors, network.consensus, network.iterations),
             self.graph.names,
-            with_single=self.scenario.baselines.single,
+            self.single(name),
         )
 
     def central(self) -> Central:
