@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Field, PositiveInt, model_validator
 from network.graph import Edge, Graph, complete, grid, path, ring, star
 from network.keys import check_name
 from network.options import Options
+from network.quantization import PayloadOptions
 from network.weights import ConsensusOptions
 from nodes.filtering.fusion import FusionOptions
 from nodes.filtering.target import TargetOptions
@@ -98,6 +99,8 @@ class NetworkOptions(Options):
     """The averaging."""
     iterations: int = Field(default=12, ge=0, le=1000)
     """Rounds of consensus in a frame, t."""
+    payload: PayloadOptions = PayloadOptions()
+    """How many bits a number of the rounds has."""
     deadline_s: float = Field(default=5.0, gt=0)
     """In lockstep, the time that a frame waits for a neighbour before it goes on without it, in s."""
     router: str = "tcp/127.0.0.1:7447"
@@ -196,6 +199,7 @@ class Scenario(Options):
         graph = self.graph
         graph.require_connected()
         self.network.consensus.require_convergence(graph.max_degree)
+        self.network.consensus.tuned(graph, self.network.iterations)
         return self
 
     @property
