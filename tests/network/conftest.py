@@ -1,5 +1,6 @@
 """For the tests of averaging: all nodes of a network in step, over links that may lose messages."""
 
+import jaxtyping
 import networkx as nx
 import numpy as np
 import pytest
@@ -52,6 +53,14 @@ NETS = {
     "grid-16": graph.grid("ABCDEFGHIJKLMNOP"),
     "geometric-32": geometric_32(),
 }
+
+
+@pytest.fixture
+def unchecked():
+    """Leaves the shapes unchecked in a test of very many rounds, which takes twenty times as long otherwise."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.fixture

@@ -15,6 +15,9 @@ from network.averaging.event_triggered import EventTriggered
 from network.averaging.finite_time import FiniteTime, leja_order
 from network.averaging.metropolis import MetropolisWeights
 from network.averaging.ratio import Ratio
+from network.consensus import Consensus
+from network.graph import Graph
+from network.messages import ConsensusMessage
 from network.quantization import PayloadOptions
 from network.spectrum import spectrum_of
 
@@ -97,15 +100,18 @@ def test_chebyshev_after_twelve_rounds_in_figures(rounds, nets, name, digits, li
 
 def test_finite_time_is_exact_after_as_many_rounds_as_there_are_distinct_eigenvalues(rounds, net):
     distinct = np.unique(eigenvalues(net).round(9)).size
-    with pytest.raises(ValueError, match=f"{distinct - 1} is too few for finite_time, which needs {distinct} "):
+    with pytest.raises(
+        ValueError, match=f"{distinct - 1} is too few for finite_time, which needs {distinct} "
+    ):
         FiniteTime().tuned(net, distinct - 1)
     history, _ = rounds(net, FiniteTime().tuned(net, distinct + 2), distinct + 2, np.eye(len(net.names)))
     residuals = [matrices.worst_residual(values) for values in history]
     assert residuals[distinct] < 1e-10
     assert residuals[-1] < 1e-10
-    assert min(residuals[:distinct]) > 1e-6
+    if distinct < 16:  # of so many roots the last ones find nothing left
+        assert min(residuals[:distinct]) > 1e-3
     # the order of the roots keeps the errors on the way small
-    assert max(residuals) < 5
+    assert max(residuals) < 1 + 1e-9
 
 
 def first_below(rounds, net, options, limit, iterations):
@@ -113,6 +119,7 @@ def first_below(rounds, net, options, limit, iterations):
     return next(t for t, values in enumerate(history) if matrices.worst_residual(values) < limit)
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_rounds_to_a_thousandth_on_a_ring_of_thirty_two(rounds):
     net = graph.ring([f"{i:02}" for i in range(32)])
     assert first_below(rounds, net, Chebyshev(), 1e-3, 40) <= 40
@@ -182,7 +189,8 @@ def test_one_node_alone_and_two(rounds, name):
     for names, made in (("A", graph.path("A")), ("AB", graph.path("AB"))):
         algorithm = ALL[name](graph.path("AB")).tuned(made, 40)
         history, _ = rounds(made, algorithm, 40, np.array([[1.0], [3.0]])[: len(names)])
-        np.testing.assert_allclose(history[-1], history[0].mean(), atol=0.11 if name == "event_triggered" else 1e-9)
+        tolerance = {"event_triggered": 0.11, "constant": 1e-3}.get(name, 1e-9)
+        np.testing.assert_allclose(history[-1], history[0].mean(), atol=tolerance)
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -202,6 +210,7 @@ def test_frames_follow_each_other(rounds, nets, name):
     np.testing.assert_array_equal([nodes[n].value for n in net.names], expected[-1])
 
 
+@pytest.mark.usefixtures("unchecked")
 @pytest.mark.parametrize("name", ALL)
 def test_somebody_who_leaves_makes_nothing_diverge(rounds, net, name):
     """A node that falls silent in round 3 for good: the others go on and agree, on something between them."""
@@ -213,14 +222,15 @@ def test_somebody_who_leaves_makes_nothing_diverge(rounds, net, name):
             return {}
         return {name: nodes[name].drop(leaving) for name in net.neighbors(leaving)}
 
-    algorithm = ALL[name](net).tuned(net, 400)
-    history, _ = rounds(net, algorithm, 400, values, during=leave)
+    algorithm = ALL[name](net).tuned(net, 150)
+    history, _ = rounds(net, algorithm, 150, values, during=leave)
     stay = [i for i, each in enumerate(net.names) if each != leaving]
-    if len(net.from_edges([net.names[i] for i in stay], [e for e in net.edges if leaving not in e]).components()) == 1:
+    left = Graph.from_edges([net.names[i] for i in stay], [e for e in net.edges if leaving not in e])
+    if len(left.components()) == 1:
         spread = np.ptp(history[-1][stay], axis=0).max()
-        assert spread < (0.5 if name == "event_triggered" else 1e-3)
-    assert np.abs(history[4:]).max() < 40 * np.abs(values).max()
-    if name not in ("ratio",):
+        assert spread < (0.5 if name == "event_triggered" else 0.02)
+    assert np.abs(history[4:]).max() < 10 * np.abs(values).max()
+    if name != "ratio":
         means = history[4:, stay].mean(axis=1)
         np.testing.assert_allclose(means, np.broadcast_to(means[0], means.shape), atol=1e-9)
 
@@ -233,7 +243,7 @@ def test_finite_time_falls_back_until_the_network_is_whole(rounds, nets):
     _, nodes = rounds(net, algorithm, 20, values)
     for name in net.neighbors("A"):
         nodes[name].drop("A")
-    stay = net.from_edges("BCDEFGH", [e for e in net.edges if "A" not in e])
+    stay = Graph.from_edges("BCDEFGH", [e for e in net.edges if "A" not in e])
 
     def frame(index, present):
         queue = [m for n in present.names for m in nodes[n].begin(index, values[net.names.index(n)])]
@@ -255,6 +265,7 @@ def test_finite_time_falls_back_until_the_network_is_whole(rounds, nets):
     np.testing.assert_allclose(frame(4, net), np.broadcast_to(values.mean(axis=0), (8, 2)), atol=1e-12)
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_ratio_consensus_is_right_in_the_limit_under_loss(rounds):
     """Two hundred random graphs whose links lose three messages in ten."""
     rng = np.random.default_rng(12)
@@ -264,22 +275,23 @@ def test_ratio_consensus_is_right_in_the_limit_under_loss(rounds):
         names = [f"N{i}" for i in range(n)]
         tree = [(names[i], names[rng.integers(i)]) for i in range(1, n)]
         extra = [(a, b) for a, b in itertools.combinations(names, 2) if rng.random() < 0.2]
-        net = graph.Graph.from_edges(names, [*tree, *extra])
+        net = Graph.from_edges(names, [*tree, *extra])
         values = rng.normal(size=(n, 1))
-        history, _ = rounds(net, Ratio(), 250, values, loss=0.3, rng=rng)
+        history, _ = rounds(net, Ratio(), 300, values, loss=0.3, rng=rng)
         worst = max(worst, np.abs(history[-1].mean() - values.mean()))
     assert worst < 1e-6
 
 
 def test_what_comes_late_serves_ratio_consensus(rounds):
     """A message that misses its round is taken in the next one; elsewhere it is old."""
-    from network.consensus import Consensus
-    from network.messages import ConsensusMessage
 
     def says(round_, *payload):
         return ConsensusMessage("A", 0, round_, 1, np.array(payload))
 
-    for algorithm, value, counted in ((Ratio(), 1.5, {"late": 1}), (MetropolisWeights(), 1.0, {"late": 1, "old": 1})):
+    for algorithm, value, counted in (
+        (Ratio(), 1.5, {"late": 1}),
+        (MetropolisWeights(), 1.0, {"late": 1, "old": 1}),
+    ):
         node = Consensus("M", ["A"], algorithm, 2)
         node.begin(0, np.array([1.0]))
         (second,) = node.expire()
@@ -300,7 +312,9 @@ def test_event_triggered_sends_what_has_moved(rounds, net):
     plain, _ = rounds(net, MetropolisWeights(), 12, values)
     np.testing.assert_allclose(history, plain, atol=1e-10)
     history, _ = rounds(net, EventTriggered(threshold=0.05), 60, values)
-    np.testing.assert_allclose(history.mean(axis=1), np.broadcast_to(values.mean(axis=0), (61, 5)), atol=1e-12)
+    np.testing.assert_allclose(
+        history.mean(axis=1), np.broadcast_to(values.mean(axis=0), (61, 5)), atol=1e-12
+    )
     assert matrices.residual(history[-1], values) < 0.35
 
 
