@@ -26,7 +26,15 @@ PURE = (
         ROOT / "network" / name
         for name in (
             *("codec.py", "consensus.py", "errors.py", "graph.py", "keys.py", "memory.py"),
-            *("messages.py", "options.py", "quantization.py", "spectrum.py", "streams.py", "weights.py"),
+            *(
+                "messages.py",
+                "options.py",
+                "quantization.py",
+                "random_graphs.py",
+                "spectrum.py",
+                "streams.py",
+                "weights.py",
+            ),
         )
     ),
 )

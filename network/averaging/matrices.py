@@ -3,8 +3,9 @@
 The theory that the state machines are held against, and the way to average over many thousand nodes in one
 process. Rows are nodes in the graph's order. It needs SciPy, which node processes do not import.
 
-Residuals are ||X(t) - mean|| / ||X(0) - mean||, Frobenius norms over nodes and numbers; the worst over all starts
-is the largest singular value of the rounds' matrix on vectors that sum to zero.
+Residuals are ||X(t) - mean|| / ||X(0) - mean||, Frobenius norms over nodes and numbers; the worst over all
+starts is the largest singular value of the rounds' matrix on vectors that sum to zero. Rates are what is left
+of the residual from one round to the next, in the limit.
 """
 
 from collections.abc import Callable, Iterator
@@ -78,6 +79,26 @@ def ratio(L: sparse.csr_array, values: Float[np.ndarray, "C K"]) -> Rounds:
     while True:
         yield mass[:, :-1] / mass[:, -1:]
         mass = mass - L @ (shares * mass)
+
+
+def linear_rate(L: sparse.csr_array, step: float = 1.0) -> float:
+    """max |1 - ελ| over the non-zero eigenvalues λ of L."""
+    eigenvalues = np.linalg.eigvalsh(L.toarray())[1:]
+    return float(np.abs(1 - step * eigenvalues).max(initial=0.0))
+
+
+def chebyshev_rate(spectrum: Spectrum) -> float:
+    """(1 - √(1 - ρ²)) / ρ: the limit of T_t(1/ρ) / T_t+1(1/ρ)."""
+    rho = spectrum.contraction
+    return (1 - np.sqrt(1 - rho**2)) / rho if rho else 0.0
+
+
+def ratio_rate(L: sparse.csr_array) -> float:
+    """The second largest |eigenvalue| of P = I - L (I + D)⁻¹."""
+    # similar to a symmetric matrix, by the roots of the shares
+    root = np.sqrt(1 / (1 + L.diagonal()))
+    eigenvalues = np.linalg.eigvalsh(root[:, None] * L.toarray() * root)[1:]
+    return float(np.abs(1 - eigenvalues).max(initial=0.0))
 
 
 def residual(values: Float[np.ndarray, "C K"], start: Float[np.ndarray, "C K"]) -> float:

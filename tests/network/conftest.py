@@ -11,7 +11,7 @@ from network.graph import Graph
 
 
 def run_rounds(net, algorithm, iterations, values, *, loss=0.0, rng=None, quantizers=None, during=None):
-    """The values before the first round and after each: an array of rounds, nodes and numbers, and the nodes.
+    """The values before the first round and after each, by rounds, nodes and numbers; and the nodes.
 
     Each round's messages arrive together, those that are not lost; what is late is not waited for. `during` is
     called with the round and the nodes after every one.
@@ -23,7 +23,7 @@ def run_rounds(net, algorithm, iterations, values, *, loss=0.0, rng=None, quanti
     history = [np.array(values, dtype=float)]
     outgoing = {name: nodes[name].begin(0, value) for name, value in zip(net.names, values, strict=True)}
     for round_ in range(1, iterations + 1):
-        sent, outgoing = outgoing, {name: () for name in net.names}
+        sent, outgoing = outgoing, dict.fromkeys(net.names, ())
         for sender, messages in sent.items():
             for message in messages:
                 for receiver in net.neighbors(sender):
@@ -57,10 +57,10 @@ NETS = {
 
 @pytest.fixture
 def unchecked():
-    """Leaves the shapes unchecked in a test of very many rounds, which takes twenty times as long otherwise."""
-    jaxtyping.config.update("jaxtyping_disable", True)
+    """Leaves shapes unchecked in a test of very many rounds, which takes ten times as long otherwise."""
+    jaxtyping.config.update("jaxtyping_disable", "1")
     yield
-    jaxtyping.config.update("jaxtyping_disable", False)
+    jaxtyping.config.update("jaxtyping_disable", "0")
 
 
 @pytest.fixture

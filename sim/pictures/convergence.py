@@ -1,0 +1,75 @@
+"""The figure of averaging algorithms: how the error shrinks over the rounds, and what theory says.
+
+Imports matplotlib: what only runs scenarios does not import this module.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+
+from sim.pictures.plots import cleaned
+from sim.pictures.theme import INK, MUTED
+from sim.running.convergence import Convergence
+
+_LOOKS = {
+    "constant": ("#000000", "s"),
+    "metropolis": ("#0072B2", "o"),
+    "best_constant": ("#56B4E9", "D"),
+    "chebyshev": ("#D55E00", "^"),
+    "finite_time": ("#009E73", "v"),
+    "ratio": ("#CC79A7", "P"),
+    "event_triggered": ("#E69F00", "X"),
+}
+"""Colour (Okabe & Ito 2008) and marker of each algorithm."""
+_FLOOR = 1e-13
+"""Where rounding has taken over; what is exact lies here."""
+
+
+def plot_convergence(graph: str, found: Mapping[str, Convergence]) -> Figure:
+    """The residual over the rounds, measured (marks) and by theory (lines).
+
+    Args:
+        graph: What the graph is called.
+        found: How each algorithm converges.
+
+    Returns:
+        A figure with rates and bytes in its legend; the axis is logarithmic and ends where rounding takes over.
+
+    Raises:
+        ValueError: There is no algorithm.
+    """
+    if not found:
+        raise ValueError("there is no algorithm to plot: name at least one")
+    figure = Figure(figsize=(9.2, 4.6), layout="constrained")
+    axes = cleaned(figure.add_subplot())
+    axes.set_yscale("log")
+    for name, each in found.items():
+        color, marker = _LOOKS[name]
+        rounds = np.arange(len(each.residual) + 1)
+        if each.expected is not None:
+            expected = np.maximum(np.r_[1.0, each.expected], _FLOOR)
+            axes.plot(rounds, expected, color=color, linewidth=1.2, alpha=0.8)
+        label = (
+            f"{name.replace('_', ' ')}\n"
+            f"rate {each.rate:.3f} (theory {each.theory:.3f}), {_bytes(each.bytes_per_round)} a round"
+        )
+        axes.plot(
+            rounds, np.maximum(np.r_[1.0, each.residual], _FLOOR), linestyle="none", marker=marker,
+            markersize=5, markeredgewidth=0, color=color, label=label,
+            markevery=max(1, len(rounds) // 40),
+        )  # fmt: skip
+    axes.plot([], [], color=MUTED, linewidth=1.2, label="lines: theory")
+    axes.set(xlabel="round", ylabel="worst residual  ||x - mean|| / ||x(0) - mean||", title=graph)
+    axes.yaxis.set_major_locator(LogLocator(numticks=9))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlim(0, max(len(each.residual) for each in found.values()) + 0.3)
+    axes.set_ylim(_FLOOR / 2, 2)
+    figure.legend(loc="outside right upper", frameon=False, labelcolor=INK, labelspacing=0.9)
+    return figure
+
+
+def _bytes(count: float) -> str:
+    return f"{count / 1e3:.1f} kB" if count >= 1e4 else f"{count:.0f} B"
