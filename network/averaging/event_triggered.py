@@ -2,12 +2,13 @@
 
 Source: Seyboth, Dimarogonas & Johansson 2013. Both ends of a link use the values last said, so that they move
 alike and the average stays, whoever is silent. The steps are Metropolis steps; the error shrinks like theirs
-down to a floor that the threshold sets.
+down to a floor that the threshold sets. A link whose ends have said nothing new and are near each other
+rests: without that, what little they differ by would move them on, round by round, until they have to speak.
 
-A number has moved when it differs from the one last said by more than a fraction of the largest that the node
-has said or heard in this frame, each place of the vector by itself: places may differ in their units. For an
-information matrix Λ on A axes, that is an equivalent of a threshold on the Kullback-Leibler divergence:
-between Gaussians with Λ and (1 + δ)Λ it is ½ A (δ - ln(1 + δ)), about A δ² / 4.
+The distance of two vectors is the root mean square over their places, each relative to the largest magnitude
+that has been said there in this frame: places may differ in their units. For information matrices on A axes,
+that is an equivalent of a threshold on the Kullback-Leibler divergence: between Gaussians with Λ and (1 + δ)Λ
+it is ½ A (δ - ln(1 + δ)), about A δ² / 4.
 
 A silent round is a message without numbers, since only a message tells silence from loss. A node whose value
 is zero, such as a camera that sees nothing, has nothing to say until it hears something. Where a message with
@@ -26,20 +27,40 @@ from network.averaging.algorithm import Algorithm, AlgorithmOptions, State, Vect
 from network.graph import Graph
 from network.messages import ConsensusMessage
 
+_REST = 2.0
+"""Thresholds by which the ends of a link that rests may differ."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Said(State):
-    """A state with what has been said of it.
+class Voice:
+    """What a node has said in this frame.
 
     Attributes:
-        said: The node's value as it last said it; zeros before.
-        heard: Those of its neighbours.
-        scale: The largest magnitude said or heard in this frame, place by place.
+        last: Its value as it last said it; zeros before.
+        peak: The largest magnitude that it has said, place by place.
     """
 
-    said: Float[np.ndarray, " K"]
-    heard: Mapping[str, Float[np.ndarray, " K"]]
-    scale: Float[np.ndarray, " K"]
+    last: Float[np.ndarray, " K"]
+    peak: Float[np.ndarray, " K"]
+
+    def after(self, payload: Vector) -> "Voice":
+        """The same after a message, which may be silent."""
+        if not payload.size:
+            return self
+        return Voice(payload, np.maximum(self.peak, np.abs(payload)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Talk(State):
+    """A state with what has been said of it, and heard.
+
+    Attributes:
+        own: What the node has said.
+        heard: What each neighbour has said.
+    """
+
+    own: Voice
+    heard: Mapping[str, Voice]
 
 
 class EventTriggered(AlgorithmOptions):
@@ -47,9 +68,9 @@ class EventTriggered(AlgorithmOptions):
 
     algorithm: Literal["event_triggered"] = "event_triggered"
     """A node sends its value only when it has moved; weights as in `metropolis`."""
-    threshold: float = Field(default=0.05, gt=0, lt=1)
-    """How far a number must have moved to be sent, as a fraction of the largest that the node has sent or
-    heard in its place in this frame; for an information matrix on A axes about A threshold² / 4 nats."""
+    threshold: float = Field(default=0.2, gt=0, lt=1)
+    """How far a value must have moved to be sent, relative to the largest said or heard in this frame; for an
+    information matrix on A axes about A threshold² / 4 nats."""
 
     uses_late: ClassVar[bool] = False
 
@@ -57,28 +78,42 @@ class EventTriggered(AlgorithmOptions):
         """The algorithm itself."""
         return self
 
-    def begin(self, value: Vector, last: Said | None) -> Said:  # noqa: ARG002 - a frame's value is new
+    def begin(self, value: Vector, last: Talk | None) -> Talk:  # noqa: ARG002 - a frame's value is new
         """The node's own value, of which nobody has heard."""
-        return Said(value, np.zeros_like(value), {}, np.abs(value))
+        return Talk(value, _silent(value), {})
 
-    def payload(self, state: Said, degree: int) -> Vector:  # noqa: ARG002 - the same for everybody
+    def payload(self, state: Talk, degree: int) -> Vector:  # noqa: ARG002 - the same for everybody
         """The value if it has moved, nothing otherwise."""
-        moved = np.abs(state.value - state.said) > self.threshold * state.scale
-        return state.value if moved.any() else state.value[:0]
+        peaks = [np.abs(state.value), state.own.peak, *(voice.peak for voice in state.heard.values())]
+        moved = distance(state.value, state.own.last, np.max(peaks, axis=0)) > self.threshold
+        return state.value if moved else state.value[:0]
 
-    def fits(self, state: Said, message: ConsensusMessage) -> bool:
+    def fits(self, state: Talk, message: ConsensusMessage) -> bool:
         """Whether it is as long as the node's own, or empty."""
         return message.payload.shape in (state.value.shape, (0,))
 
-    def step(self, state: Said, own: ConsensusMessage, received: Sequence[ConsensusMessage]) -> Said:
-        """A step towards what every neighbour last said."""
-        said = own.payload if own.payload.size else state.said
-        value, heard, scale = state.value.copy(), dict(state.heard), np.maximum(state.scale, np.abs(said))
+    def step(self, state: Talk, own: ConsensusMessage, received: Sequence[ConsensusMessage]) -> Talk:
+        """A step towards what every neighbour last said, over the links that do not rest."""
+        here = state.own.after(own.payload)
+        value, heard = state.value.copy(), dict(state.heard)
         for message in received:
-            if message.payload.size:
-                heard[message.sender] = message.payload
-                scale = np.maximum(scale, np.abs(message.payload))
-            # a_l(t) = a_l(t-1) + Σ_j w_lj (â_j - â_l)
-            weight = metropolis_weight(own.degree, message.degree)
-            value += weight * (heard.get(message.sender, 0.0) - said)
-        return Said(value, said, heard, scale)
+            there = heard.get(message.sender, _silent(value)).after(message.payload)
+            heard[message.sender] = there
+            news = own.payload.size or message.payload.size
+            apart = distance(there.last, here.last, np.maximum(there.peak, here.peak))
+            if news or apart > _REST * self.threshold:
+                # a_l(t) = a_l(t-1) + Σ_j w_lj (â_j - â_l)
+                value += metropolis_weight(own.degree, message.degree) * (there.last - here.last)
+        return Talk(value, here, heard)
+
+
+def distance(
+    one: Float[np.ndarray, " K"], other: Float[np.ndarray, " K"], scale: Float[np.ndarray, " K"]
+) -> float:
+    """Root mean square of the differences relative to a scale; places whose scale is 0 hold nothing but 0."""
+    relative = (one - other) / np.where(scale > 0, scale, 1.0)
+    return float(np.sqrt(np.mean(relative**2))) if relative.size else 0.0
+
+
+def _silent(value: Vector) -> Voice:
+    return Voice(np.zeros_like(value), np.zeros_like(value))

@@ -35,7 +35,7 @@ class FiniteTime(AlgorithmOptions):
         """The finite-time rounds of this graph.
 
         Raises:
-            ValueError: There are fewer rounds than the graph needs: unfinished ones are far worse than others.
+            ValueError: There are fewer rounds than the graph needs; unfinished, they promise nothing.
         """
         roots = leja_order(np.array(spectrum_of(graph).eigenvalues))
         if iterations < len(roots):
@@ -108,7 +108,11 @@ class TunedFiniteTime:
 
 
 def leja_order(points: Float[np.ndarray, " K"]) -> Float[np.ndarray, " K"]:
-    """Points so that each is the farthest from those before, by the product of distances (Reichel 1991)."""
+    """Points so that each is farthest from 0 and those before, by the product of distances (Reichel 1991).
+
+    Args:
+        points: Positive numbers.
+    """
     order: list[int] = []
     # sums of logarithms, since the products leave the range of floats
     score = np.log(points)

@@ -82,7 +82,7 @@ def ratio(L: sparse.csr_array, values: Float[np.ndarray, "C K"]) -> Rounds:
 
 
 def linear_rate(L: sparse.csr_array, step: float = 1.0) -> float:
-    """max |1 - ελ| over the non-zero eigenvalues λ of L."""
+    """The largest |1 - ελ| over the non-zero eigenvalues λ of L."""
     eigenvalues = np.linalg.eigvalsh(L.toarray())[1:]
     return float(np.abs(1 - step * eigenvalues).max(initial=0.0))
 

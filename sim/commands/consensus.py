@@ -107,20 +107,21 @@ def _write(report: dict[str, Any], title: str, found: "dict[str, Convergence]", 
 def _print(report: dict[str, Any], title: str, folder: Path) -> None:
     console, facts = Console(highlight=False), report["graph"]
     eigenvalues = facts["eigenvalues"] or [0.0]
+    rounds = max(len(each["residual"]) for each in report["algorithms"].values())
     console.print(
-        f"{title}: {len(facts['edges'])} links, largest degree {facts['max_degree']}, λ₂ = {eigenvalues[0]:.3g},"
-        f" λ_N = {eigenvalues[-1]:.3g}, {len(facts['eigenvalues'])} distinct non-zero eigenvalues",
+        f"{title}, {rounds} rounds: {len(facts['edges'])} links, largest degree {facts['max_degree']},"
+        f" λ₂ = {eigenvalues[0]:.3g}, λ_N = {eigenvalues[-1]:.3g},"
+        f" {len(facts['eigenvalues'])} distinct non-zero eigenvalues",
         soft_wrap=True,
     )
     table = Table()
     table.add_column("algorithm", no_wrap=True)
-    for heading in ("rounds", "residual", "theory", "rate", "theory", "bytes a round"):
+    for heading in ("residual", "theory", "rate", "theory", "B a round"):
         table.add_column(heading, justify="right", no_wrap=True)
     for name, each in report["algorithms"].items():
         residual, expected = each["residual"], each["theory_residual"]
         table.add_row(
             name,
-            str(len(residual)),
             f"{residual[-1]:.2g}",
             "–" if expected is None else f"{expected[-1]:.2g}",
             f"{each['rate']:.4f}",

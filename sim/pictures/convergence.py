@@ -3,7 +3,7 @@
 Imports matplotlib: what only runs scenarios does not import this module.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,7 +11,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from sim.pictures.plots import cleaned
 from sim.pictures.theme import INK, MUTED
-from sim.running.convergence import Convergence
+from sim.running.convergence import EXACT, Convergence
 
 _LOOKS = {
     "constant": ("#000000", "s"),
@@ -23,8 +23,6 @@ _LOOKS = {
     "event_triggered": ("#E69F00", "X"),
 }
 """Colour (Okabe & Ito 2008) and marker of each algorithm."""
-_FLOOR = 1e-13
-"""Where rounding has taken over; what is exact lies here."""
 
 
 def plot_convergence(graph: str, found: Mapping[str, Convergence]) -> Figure:
@@ -35,7 +33,7 @@ def plot_convergence(graph: str, found: Mapping[str, Convergence]) -> Figure:
         found: How each algorithm converges.
 
     Returns:
-        A figure with rates and bytes in its legend; the axis is logarithmic and ends where rounding takes over.
+        A figure with rates and bytes in its legend. The axis is logarithmic; what is exact lies on its foot.
 
     Raises:
         ValueError: There is no algorithm.
@@ -45,19 +43,20 @@ def plot_convergence(graph: str, found: Mapping[str, Convergence]) -> Figure:
     figure = Figure(figsize=(9.2, 4.6), layout="constrained")
     axes = cleaned(figure.add_subplot())
     axes.set_yscale("log")
+    floor = _floor(found.values())
     for name, each in found.items():
         color, marker = _LOOKS[name]
         rounds = np.arange(len(each.residual) + 1)
         if each.expected is not None:
-            expected = np.maximum(np.r_[1.0, each.expected], _FLOOR)
+            expected = np.maximum(np.r_[1.0, each.expected], floor)
             axes.plot(rounds, expected, color=color, linewidth=1.2, alpha=0.8)
         label = (
             f"{name.replace('_', ' ')}\n"
             f"rate {each.rate:.3f} (theory {each.theory:.3f}), {_bytes(each.bytes_per_round)} a round"
         )
         axes.plot(
-            rounds, np.maximum(np.r_[1.0, each.residual], _FLOOR), linestyle="none", marker=marker,
-            markersize=5, markeredgewidth=0, color=color, label=label,
+            rounds, np.maximum(np.r_[1.0, each.residual], floor), linestyle="none", marker=marker,
+            markersize=5, markeredgewidth=0, color=color, label=label, clip_on=False, zorder=3,
             markevery=max(1, len(rounds) // 40),
         )  # fmt: skip
     axes.plot([], [], color=MUTED, linewidth=1.2, label="lines: theory")
@@ -66,9 +65,17 @@ def plot_convergence(graph: str, found: Mapping[str, Convergence]) -> Figure:
     axes.yaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlim(0, max(len(each.residual) for each in found.values()) + 0.3)
-    axes.set_ylim(_FLOOR / 2, 2)
+    axes.set_ylim(floor, 1.5)
+    if any((each.residual < floor).any() for each in found.values()):
+        axes.annotate("exact", (0.01, 0.02), xycoords="axes fraction", color=MUTED)
     figure.legend(loc="outside right upper", frameon=False, labelcolor=INK, labelspacing=0.9)
     return figure
+
+
+def _floor(found: Iterable[Convergence]) -> float:
+    """A power of ten below the least residual that is more than rounding."""
+    residuals = np.concatenate([[1.0], *(each.residual for each in found)])
+    return float(10.0 ** (np.floor(np.log10(residuals[residuals > EXACT].min())) - 1))
 
 
 def _bytes(count: float) -> str:

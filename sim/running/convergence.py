@@ -40,7 +40,7 @@ ALGORITHMS = (
 )
 """All that a scenario can choose."""
 
-_EXACT = 1e-11
+EXACT = 1e-11
 """Residuals below are rounding."""
 
 
@@ -71,7 +71,7 @@ def converge(
     Args:
         scenario: The scenario.
         algorithms: Their names. One that the scenario has chosen has its options, the others have the
-            defaults; constant weights the paper's where they may converge, 1 / (1 + largest degree) elsewhere.
+            defaults; constant weights the paper's where they converge, 1 / (1 + largest degree) elsewhere.
         rounds: How many. None for the scenario's, or as many as finite-time averaging needs if it is one of
             them and these are more.
     """
@@ -179,9 +179,9 @@ def _theory(
 
 def _rate(residual: Float[np.ndarray, " T"]) -> float:
     """The mean factor over the second half of the rounds until the error is at its least, or rounding is."""
-    above = np.flatnonzero(residual > _EXACT)
+    above = np.flatnonzero(residual > EXACT)
     last = int(above[np.argmin(residual[above])])
-    if last + 1 < len(residual) and residual[last + 1] <= _EXACT and residual[last] > np.sqrt(_EXACT):
+    if last + 1 < len(residual) and residual[last + 1] <= EXACT and residual[last] > np.sqrt(EXACT):
         return 0.0  # from far off to exact in one round
     first = last // 2
     return float((residual[last] / residual[first]) ** (1 / max(last - first, 1)))

@@ -11,10 +11,10 @@ from network.graph import Graph
 
 
 def run_rounds(net, algorithm, iterations, values, *, loss=0.0, rng=None, quantizers=None, during=None):
-    """The values before the first round and after each, by rounds, nodes and numbers; and the nodes.
+    """The values before the first round and after each, by rounds, nodes and numbers; the nodes.
 
-    Each round's messages arrive together, those that are not lost; what is late is not waited for. `during` is
-    called with the round and the nodes after every one.
+    Each round's messages arrive together, those that are not lost; what is late is not waited for. `during`
+    is called with the round and the nodes after every one.
     """
     nodes = {
         name: Consensus(name, net.neighbors(name), algorithm, iterations, (quantizers or {}).get(name))
