@@ -39,12 +39,12 @@ from network.messages import (
     StatusMessage,
     TruthMessage,
 )
-from network.quantization import ENCODINGS, Encoding, half_exponent
+from network.quantization import ENCODINGS, LARGEST, Encoding, half_exponent
 
 VERSION = 1
 MAX_PIXELS = 64_000_000
 MAX_JSON_BYTES = 1_000_000
-MAX_MAGNITUDE = 1e150
+MAX_MAGNITUDE = LARGEST["float64"]
 """Larger numbers are refused like infinity: sums and products of them would overflow."""
 
 _HEADER = struct.Struct("<BBHHHQII")

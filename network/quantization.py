@@ -21,6 +21,9 @@ from network.streams import stream
 Encoding = Literal["float64", "float32", "float16"]
 ENCODINGS: tuple[Encoding, ...] = get_args(Encoding)
 
+LARGEST: dict[Encoding, float] = {"float64": 1e150, "float32": 3e38, "float16": 1e150}
+"""The largest magnitudes that are sent. Sums and products of them are far from overflowing."""
+
 _TOP_EXPONENT = 15  # the largest number of a payload lies below 2 to this power
 
 
@@ -58,7 +61,15 @@ class Quantizer:
         self._rng = rng
 
     def __call__(self, payload: Float[np.ndarray, " K"]) -> Float[np.ndarray, " K"]:
-        """A payload that its encoding holds exactly."""
+        """A payload that its encoding holds exactly.
+
+        Numbers that are too large, such as those of a node that believed nonsense, become the largest
+        there are; others that are not finite remain, for whoever writes them to refuse.
+        """
+        largest = LARGEST[self.encoding]
+        # a payload has so few numbers that Python's own are faster than NumPy's
+        if any(largest < abs(number) < np.inf for number in payload.tolist()):
+            payload = np.clip(payload, -largest, largest)
         if self.encoding == "float64":
             return payload
         if self.encoding == "float32":

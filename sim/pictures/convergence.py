@@ -51,7 +51,7 @@ def plot_convergence(graph: str, found: Mapping[str, Convergence]) -> Figure:
             expected = np.maximum(np.r_[1.0, each.expected], floor)
             axes.plot(rounds, expected, color=color, linewidth=1.2, alpha=0.8)
         label = (
-            f"{name.replace('_', ' ')}\n"
+            f"{name.replace('_', ' ')}{'' if each.expected is not None else ', one start'}\n"
             f"rate {each.rate:.3f} (theory {each.theory:.3f}), {_bytes(each.bytes_per_round)} a round"
         )
         axes.plot(

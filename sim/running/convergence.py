@@ -1,8 +1,9 @@
 """How averaging converges on a scenario's graph: the real rounds of every node, over the network in memory.
 
 The residual is the worst over all starts, ||X(t) - mean|| / ||X(0) - mean||: with a unit vector at every
-node, the values after t rounds are the rounds' matrix. Of what is not linear (thresholds, rounding) it is the
-residual of these starts. Bytes are counted on payloads as long as the scenario's fusion sends them.
+node, the values after t rounds are the rounds' matrix. Where thresholds decide what is sent there is no such
+matrix, and the residual is that of one start, drawn by the scenario's seed. Bytes are counted on that start
+too, with vectors as long as the scenario's fusion sends them.
 """
 
 from collections.abc import Iterator, Mapping
@@ -85,13 +86,16 @@ def converge(
         # finite-time rounds are those of a whole run, also where not all of them are looked at
         algorithm = options.tuned(graph, max(rounds, len(spectrum.eigenvalues)))
         nodes = _nodes(scenario, algorithm, rounds)
-        history, _ = average(scenario.name, graph, nodes, np.eye(len(graph.names)))
-        residual = np.array([matrices.worst_residual(values) for values in history])
+        units, _ = average(scenario.name, graph, nodes, np.eye(len(graph.names)))
         size = packed_size(2 * scenario.target.n_axes, scenario.fusion)
         values = np.array(
             [stream(scenario.seed, each, "consensus").normal(size=size) for each in graph.names]
         )
-        _, sent = average(scenario.name, graph, _nodes(scenario, algorithm, rounds), values)
+        drawn, sent = average(scenario.name, graph, _nodes(scenario, algorithm, rounds), values)
+        if name == "event_triggered":  # a threshold makes of unit vectors what it makes of nothing else
+            residual = np.array([matrices.residual(each, values) for each in drawn])
+        else:
+            residual = np.array([matrices.worst_residual(each) for each in units])
         theory, expected = _theory(options, graph, spectrum, rounds)
         yield name, Convergence(residual[1:], expected, _rate(residual), theory, sent / max(rounds, 1))
 

@@ -20,7 +20,8 @@ def read_graph(path: Path, names: Sequence[str]) -> Graph:
 
     Args:
         path: The file.
-        names: The cameras. The file's nodes bear their names; if none does, they stand for them in order.
+        names: The cameras. The file's nodes bear their names; if none does, they stand for them in order,
+            numbers in theirs.
 
     Raises:
         ScenarioError: The file cannot be read, or its nodes are not the cameras.
@@ -41,7 +42,8 @@ def read_graph(path: Path, names: Sequence[str]) -> Graph:
     if directed:
         raise ScenarioError(f"{path}: its edges have directions, but consensus speaks both ways: undirect it")
     if not set(nodes) & set(names) and len(nodes) == len(names):
-        renamed = dict(zip(nodes, names, strict=True))
+        in_order = sorted(nodes, key=int) if all(node.isdecimal() for node in nodes) else nodes
+        renamed = dict(zip(in_order, names, strict=True))
         return Graph.from_edges(names, [(renamed[a], renamed[b]) for a, b in edges])
     strange, missing = sorted(set(nodes) - set(names)), sorted(set(names) - set(nodes))
     if strange or missing:

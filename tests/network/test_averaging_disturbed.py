@@ -4,8 +4,10 @@ import itertools
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from network import graph
+from network import codec, graph
 from network.averaging import matrices
 from network.averaging.best_constant import BestConstant
 from network.averaging.chebyshev import Chebyshev
@@ -17,7 +19,7 @@ from network.averaging.ratio import Ratio
 from network.consensus import Consensus
 from network.graph import Graph
 from network.messages import ConsensusMessage
-from network.quantization import PayloadOptions
+from network.quantization import PayloadOptions, Quantizer
 
 ALL = {
     "constant": lambda net: ConstantWeights(epsilon=0.9 / net.max_degree),
@@ -218,3 +220,30 @@ def test_rounded_payloads_keep_the_average(rounds, nets, name, encoding, roundin
         np.testing.assert_allclose(masses.sum(axis=0)[:-1], values.sum(axis=0), rtol=1e-9)
     else:
         np.testing.assert_allclose(history[-1].mean(axis=0), values.mean(axis=0), rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ALL)
+@settings(max_examples=30)
+@given(st.data())
+def test_nonsense_from_neighbours_breaks_no_node(name, data):
+    """Whatever valid numbers come, in whatever order: what the node says can be written."""
+    net = graph.star("MAB")
+    encoding = data.draw(st.sampled_from(["float64", "float32"]))
+    node = Consensus("M", "AB", ALL[name](net).tuned(net, 5), 5, Quantizer(encoding))
+    numbers = st.sampled_from([0.0, 1.0, -1e-150, 1e150, -1e150]) | st.floats(-1e150, 1e150)
+    said = list(node.begin(0, np.ones(2)))
+    for _ in range(20):
+        match data.draw(st.integers(0, 5)):
+            case 0:
+                said += node.expire()
+            case 1:
+                said += node.drop(data.draw(st.sampled_from("AB")))
+            case _:
+                payload = np.array(data.draw(st.lists(numbers, max_size=4)), dtype=float)
+                at, degree = data.draw(st.integers(1, 6)), data.draw(st.integers(0, 2**16 - 1))
+                sender = data.draw(st.sampled_from("AB"))
+                said += node.receive(ConsensusMessage(sender, 0, at, degree, payload))
+    for message in said:
+        read = codec.decode(ConsensusMessage, "run", "M", codec.encode("run", message))
+        np.testing.assert_array_equal(read.payload, message.payload)
+    assert np.isfinite(node.value).all()
