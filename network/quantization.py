@@ -68,8 +68,9 @@ class Quantizer:
         """
         largest = LARGEST[self.encoding]
         # a payload has so few numbers that Python's own are faster than NumPy's
-        if any(largest < abs(number) < np.inf for number in payload.tolist()):
-            payload = np.clip(payload, -largest, largest)
+        numbers = payload.tolist()
+        if numbers and (max(numbers) > largest or min(numbers) < -largest):
+            payload = np.where(np.isinf(payload), payload, np.clip(payload, -largest, largest))
         if self.encoding == "float64":
             return payload
         if self.encoding == "float32":
