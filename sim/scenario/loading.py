@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
 from nodes.calibration import CalibrationError, checked_camera, cropped, read_opencv, read_qualisys, scaled
 from nodes.camera import Camera, look_at
@@ -13,17 +12,7 @@ from nodes.sources import SourceError, VideoSource
 from sim.footage import FootageError, locate
 from sim.scenario.complaints import validate
 from sim.scenario.document import merge_defaults, read_document
-from sim.scenario.graph_files import read_graph
-from sim.scenario.graphs import (
-    FileGraph,
-    GeometricGraph,
-    OverlapGraph,
-    WattsStrogatzGraph,
-    near,
-    overlapping,
-    sample_places,
-    small_world,
-)
+from sim.scenario.edges import with_edges
 from sim.scenario.model import CameraOptions, Scenario
 from sim.scenario.parsing import ScenarioError
 from sim.scenario.presets import preset_defaults
@@ -50,7 +39,8 @@ def load_scenario(path: Path, overrides: Iterable[tuple[str, str]] = ()) -> Scen
     document = merge_defaults(document, preset_defaults(document.data))
     scenario = validate(document, Scenario)
     try:
-        return _with_edges(_resolve(scenario, path.parent), path.parent)
+        resolved = _resolve(scenario, path.parent)
+        return with_edges(resolved, cameras_of(resolved), path.parent)
     except (CalibrationError, FootageError, SourceError) as error:
         raise ScenarioError(f"{path}: {error}") from None
     except ValueError as error:
@@ -90,56 +80,28 @@ def _resolve(scenario: Scenario, folder: Path) -> Scenario:
     for options in scenario.cameras:
         video = place / _video(options)
         digest = _digest(video, options)
-        # A video may be narrower than its calibration: cropped on the right, the intrinsics hold.
-        camera = cropped(_calibrated(options, folder, listed), *VideoSource(video).size_px)
+        size_px = VideoSource(video).size_px
+        if scenario.target.space == "image" and _is_uncalibrated(options, listed):
+            camera = _nominal(options.name, size_px)
+        else:
+            # A video may be narrower than its calibration: cropped on the right, the intrinsics hold.
+            camera = cropped(_calibrated(options, folder, listed), *size_px)
         resolved.append(_as_options(camera).model_copy(update={"video": str(video), "video_sha256": digest}))
     truth = footage.ground_truth and str((folder / footage.ground_truth).resolve())
     known = footage.model_copy(update={"calibration": None, "ground_truth": truth})
     return scenario.model_copy(update={"cameras": tuple(resolved), "footage": known})
 
 
-def _with_edges(scenario: Scenario, folder: Path) -> Scenario:
-    """The same scenario with the edges of its graph, where it describes one.
-
-    Raises:
-        ValueError: There is no such graph, or consensus does not converge on it.
-    """
-    described, cameras = scenario.network.graph, cameras_of(scenario)
-    if isinstance(described, str | tuple):
-        return scenario
-    match described:
-        case GeometricGraph():
-            graph = near(described, cameras)
-        case WattsStrogatzGraph():
-            graph = small_world(described, cameras, scenario.seed)
-        case OverlapGraph():
-            graph = overlapping(described, cameras, _places(scenario, cameras))
-        case FileGraph():
-            graph = read_graph(folder / described.path, tuple(cameras))
-    network = scenario.network.model_copy(update={"graph": tuple(sorted(graph.edges))})
-    scenario = scenario.model_copy(update={"network": network})
-    try:
-        scenario.require_convergence()
-    except ValueError as error:
-        raise ValueError(f"network.graph of kind {described.kind}: {error}") from None
-    return scenario
+def _is_uncalibrated(options: CameraOptions, listed: Mapping[str, Camera]) -> bool:
+    own = options.calibration or options.position or options.K
+    return own is None and options.name not in listed
 
 
-def _places(scenario: Scenario, cameras: Mapping[str, Camera]) -> Float[np.ndarray, "N 3"]:
-    """Where the target may be: over the room's floor, or over the ground between the cameras."""
-    target = scenario.target
-    if scenario.world is not None:
-        room = scenario.world.room
-        center, half = np.array(room.center), np.array(room.size) / 2
-        low, high, top = center - half, center + half, room.height
-    else:
-        centers = np.array([camera.center for camera in cameras.values()])
-        low, high, top = centers[:, :2].min(axis=0), centers[:, :2].max(axis=0), float(centers[:, 2].max())
-    if target.space == "volume":
-        bottom = 0.0
-    else:
-        bottom = top = target.plane_height + target.height / 2
-    return sample_places((*low.tolist(), bottom), (*high.tolist(), top))
+def _nominal(name: str, size_px: tuple[int, int]) -> Camera:
+    """A camera of these pictures whose place nobody needs to know: the target is tracked in its pixels."""
+    width, height = size_px
+    K = np.array([[width, 0, (width - 1) / 2], [0, width, (height - 1) / 2], [0, 0, 1.0]])
+    return Camera(name, width, height, K, np.eye(3), np.zeros(3), np.zeros(5))
 
 
 def _calibrated(options: CameraOptions, folder: Path, listed: Mapping[str, Camera]) -> Camera:
