@@ -9,6 +9,7 @@ from network import graph
 from network.averaging import matrices
 from network.averaging.metropolis import MetropolisWeights
 from network.consensus import Consensus
+from network.messages import EstimateMessage
 from sim.pictures.convergence import plot_convergence
 from sim.running.convergence import ALGORITHMS, average, converge
 from sim.scenario.loading import load_scenario
@@ -99,3 +100,30 @@ def test_the_figure_tells_of_every_algorithm(small):
 def test_there_is_no_figure_of_nothing():
     with pytest.raises(ValueError, match="there is no algorithm to plot"):
         plot_convergence("ring", {})
+
+
+CHOICES = {
+    "best_constant": [],
+    "chebyshev": [("network.payload.encoding", "float32")],
+    "finite_time": [],
+    "ratio": [],
+    "event_triggered": [("network.payload", "{encoding: float16, rounding: stochastic}")],
+}
+
+
+@pytest.mark.parametrize(("algorithm", "more"), CHOICES.items(), ids=CHOICES)
+def test_whole_runs_average_as_they_are_told(small, told, algorithm, more):
+    """The nodes of a ring agree after twelve rounds as well as their algorithm can."""
+    overrides = [("network.iterations", "12"), ("network.consensus", f"{{algorithm: {algorithm}}}"), *more]
+
+    messages = [each for each in told(small, *overrides) if isinstance(each, EstimateMessage)]
+
+    fused = [each for each in messages if each.estimator == "dcpf"]
+    assert len(fused) == 6 * 4
+    assert all(each.iterations == 12 for each in fused)
+    last = np.array([each.mean[:2] for each in fused if each.frame == 5])
+    truth = np.array([0.0, 0.75])
+    # each node has particles of its own, forty of them
+    assert np.abs(last - truth).max() < 0.5
+    again = [each for each in told(small, *overrides) if isinstance(each, EstimateMessage)]
+    np.testing.assert_array_equal([each.mean for each in again], [each.mean for each in messages])
