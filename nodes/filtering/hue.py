@@ -37,12 +37,10 @@ def hue_bins(image: UInt8[np.ndarray, "H W 3"], n_bins: int) -> UInt8[np.ndarray
         image: Blue, green, red.
         n_bins: n, at most `MAX_BINS`.
     """
-    hue, saturation, value = cv2.split(cv2.cvtColor(image.astype(np.float32), cv2.COLOR_BGR2HSV))
-    hue += NUDGE
-    hue *= (n_bins - 1) / 360
-    sector = hue.astype(np.uint8)
+    hsv = cv2.cvtColor(image.astype(np.float32), cv2.COLOR_BGR2HSV)
+    hue, saturation, value = hsv[..., 0], hsv[..., 1], hsv[..., 2]
+    sector = ((hue + np.float32(NUDGE)) * np.float32((n_bins - 1) / 360)).astype(np.uint8)
     # C = S M, and 8 C < M where S < 1/8; the numbers in between are whole, or far away
-    chroma = np.multiply(saturation, value, out=value)
-    grey = (chroma < GREY_CHROMA - 0.5) | (saturation < 1 / GREY_SATURATION - 1e-5)
-    sector[grey] = n_bins - 1
+    grey = (saturation * value < GREY_CHROMA - 0.5) | (saturation < 1 / GREY_SATURATION - 1e-5)
+    np.copyto(sector, n_bins - 1, where=grey, casting="unsafe")
     return sector
