@@ -3,10 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from network.averaging.algorithm import Algorithm
 from network.consensus import Consensus
 from network.graph import Graph
 from network.messages import TruthMessage, Visibility
@@ -63,13 +65,19 @@ class Assembly:
         return self.scenario.graph
 
     @cached_property
+    def algorithm(self) -> Algorithm[Any]:
+        """How the cameras average, tuned to their graph."""
+        network = self.scenario.network
+        return network.consensus.tuned(self.graph, network.iterations)
+
+    @cached_property
     def links(self) -> Mapping[str, Links]:
         """The nodes, the central one last if there is one, and whom each exchanges messages with."""
         return links_of(self.graph, [self.scenario.central.name] if self.scenario.baselines.cpf else [])
 
     def prepare(self) -> None:
         """Works out what all nodes share, before they part."""
-        _ = self.cameras, self.links, self.setup
+        _ = self.cameras, self.links, self.algorithm, self.setup
         if self.world is not None:
             _ = self.world.interior
 
@@ -178,10 +186,11 @@ class Assembly:
     def smart_camera(self, name: str) -> SmartCamera:
         """A camera's node."""
         network, neighbors = self.scenario.network, self.links[name].neighbors
+        quantizer = network.payload.quantizer(self.scenario.seed, name)
         return SmartCamera(
             self.model_on_camera(name),
             self.setup,
-            Consensus(name, neighbors, network.consensus, network.iterations),
+            Consensus(name, neighbors, self.algorithm, network.iterations, quantizer),
             self.graph.names,
             self.single(name),
         )

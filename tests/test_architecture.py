@@ -17,6 +17,7 @@ OUTSIDE_WORLD = {
 
 PURE = (
     *sorted((ROOT / "nodes/filtering").glob("*.py")),
+    *sorted((ROOT / "network/averaging").glob("*.py")),
     *(
         ROOT / "nodes" / name
         for name in ("camera.py", "central.py", "estimator.py", "setup.py", "smart_camera.py")
@@ -25,7 +26,15 @@ PURE = (
         ROOT / "network" / name
         for name in (
             *("codec.py", "consensus.py", "errors.py", "graph.py", "keys.py", "memory.py"),
-            *("messages.py", "options.py", "streams.py", "weights.py"),
+            *(
+                "messages.py",
+                "options.py",
+                "quantization.py",
+                "random_graphs.py",
+                "spectrum.py",
+                "streams.py",
+                "weights.py",
+            ),
         )
     ),
 )

@@ -243,7 +243,7 @@ def _fusion(results: Results) -> dict[str, Any]:
 
 
 def _array(results: Results) -> dict[str, Any]:
-    """What a frame costs a camera on the emulated processor array, the most over the cameras; if there is one."""
+    """What a frame costs a camera on the emulated array, if there is one: the most over the cameras."""
     told = [status.counters["simd"] for status in results.statuses.values() if "simd" in status.counters]
     each = [figures for figures in told if isinstance(figures, Mapping)]
     if not each:
