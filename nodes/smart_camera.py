@@ -108,6 +108,10 @@ class SmartCamera:
         self._cameras.discard(neighbor)
         return self._with_result(self._consensus.drop(neighbor))
 
+    def on_round_deadline(self) -> Outgoing:
+        """The round's time is up: it is done without those that are late."""
+        return self._with_result(self._consensus.expire())
+
     def on_deadline(self) -> Outgoing:
         """The frame's time is up: what the rounds have reached must do."""
         self._consensus.cut()
