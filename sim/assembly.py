@@ -80,7 +80,13 @@ class Assembly:
     def pace(self) -> Pace:
         """When frames and rounds begin and end."""
         network = self.scenario.network
-        return Pace(self.scenario.pace, self.scenario.rate_hz, network.deadline_s, network.iterations)
+        return Pace(
+            self.scenario.pace,
+            self.scenario.rate_hz,
+            network.deadline_s,
+            network.iterations,
+            network.lag_frames,
+        )
 
     def prepare(self) -> None:
         """Works out what all nodes share, before they part."""
@@ -197,7 +203,10 @@ class Assembly:
         return SmartCamera(
             self.model_on_camera(name),
             self.setup,
-            Consensus(name, neighbors, self.algorithm, network.iterations, quantizer),
+            [
+                Consensus(name, neighbors, self.algorithm, network.iterations, quantizer)
+                for _ in range(1 + network.lag_frames)
+            ],
             self.graph.names,
             self.single(name),
         )

@@ -61,7 +61,7 @@ class InProcess:
         )
         self._telemetry = {name: Telemetry() for name in self._nodes}
         self._now_ns = 0
-        self._begun_ns = 0  # the frame in hand
+        self._begun_ns: list[int] = []  # by frame
 
     def run(self) -> Iterator[Told]:
         """All frames, one after the other."""
@@ -81,7 +81,7 @@ class InProcess:
 
     def _begin(self, frame: int) -> Iterator[EstimateMessage]:
         """Every camera takes its picture, and says its first."""
-        self._begun_ns = self._now_ns
+        self._begun_ns.append(self._now_ns)
         for name, camera in self._cameras.items():
             image = self._sources[name].read(frame)
             if self._central is not None:
@@ -111,19 +111,20 @@ class InProcess:
             self._now_ns = next_ns
             yield from self._deliver()
             # what arrives at the deadline is in time
-            for name, deadline_ns in deadlines.items():
-                if deadline_ns <= self._now_ns and self._deadline_ns(name) == deadline_ns:
-                    yield from self._speak(name, self._cameras[name].on_round_deadline())
+            for (name, frame, round_), deadline_ns in deadlines.items():
+                camera = self._cameras[name]
+                if deadline_ns <= self._now_ns and camera.open_rounds.get(frame) == round_:
+                    yield from self._speak(name, camera.on_round_deadline(frame))
         if until_ns is not None:
             self._now_ns = until_ns
 
-    def _deadlines_ns(self) -> dict[str, int]:
-        """When the round of each camera that waits is over."""
-        return {name: self._deadline_ns(name) for name, each in self._cameras.items() if each.waiting_for}
-
-    def _deadline_ns(self, name: str) -> int:
-        round_ = self._cameras[name].rounds_done + 1
-        return self._begun_ns + round(NS * self._pace.round_deadline_s(round_))
+    def _deadlines_ns(self) -> dict[tuple[str, int, int], int]:
+        """When each round that a camera is in is over, by camera, frame and round."""
+        return {
+            (name, frame, round_): self._begun_ns[frame] + round(NS * self._pace.round_deadline_s(round_))
+            for name, camera in self._cameras.items()
+            for frame, round_ in camera.open_rounds.items()
+        }
 
     def _deliver(self) -> Iterator[EstimateMessage]:
         """What has arrived, and what it brings forth at once."""
