@@ -85,7 +85,7 @@ class Assembly:
             self.scenario.rate_hz,
             network.deadline_s,
             network.iterations,
-            network.lag_frames,
+            self.scenario.lag_frames,
         )
 
     def prepare(self) -> None:
@@ -205,7 +205,7 @@ class Assembly:
             self.setup,
             [
                 Consensus(name, neighbors, self.algorithm, network.iterations, quantizer)
-                for _ in range(1 + network.lag_frames)
+                for _ in range(1 + self.scenario.lag_frames)
             ],
             self.graph.names,
             self.single(name),
