@@ -20,12 +20,12 @@ PURE = (
     *sorted((ROOT / "network/averaging").glob("*.py")),
     *(
         ROOT / "nodes" / name
-        for name in ("camera.py", "central.py", "estimator.py", "setup.py", "smart_camera.py")
+        for name in ("camera.py", "central.py", "estimator.py", "pace.py", "setup.py", "smart_camera.py")
     ),
     *(
         ROOT / "network" / name
         for name in (
-            *("codec.py", "consensus.py", "errors.py", "graph.py", "keys.py", "memory.py"),
+            *("codec.py", "conditions.py", "consensus.py", "errors.py", "graph.py", "keys.py", "memory.py"),
             *(
                 "messages.py",
                 "options.py",
