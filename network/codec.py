@@ -5,13 +5,17 @@ Messages between nodes are little-endian and begin with one header of 24 bytes:
 | offset | type | field |
 |---|---|---|
 | 0 | u8 | version of this layout, 1 |
-| 1 | u8 | kind in the lower four bits: 1 consensus, 2 pixels, 3 confirm |
-|   |    | encoding in the upper four: consensus: 0 float64, 1 float32, 2 float16; others 0 |
-| 2 | 3 x u16 | consensus: numbers in the payload K, round, sender's degree; pixels: height, width, 0 |
+| 1 | u8 | kind in the lower four bits: 1 consensus, 2 pixels, 3 confirm, 4 state |
+|   |    | encoding in the next three: consensus: 0 float64, 1 float32, 2 float16; others 0 |
+|   |    | highest bit: consensus: whether links are told to be down; others 0 |
+| 2 | 3 x u16 | consensus: numbers in the payload K, round, sender's degree; pixels: height, width, 0; |
+|   |    | state: numbers in the state D, in the looks K, 0 |
 | 8 | u64 | run: BLAKE2b of its name, 8 bytes |
 | 16 | u32 | sender: BLAKE2b of its name, 4 bytes |
 | 20 | u32 | frame |
-| 24 | | consensus: K numbers, float16 ones after an i16 e and times 2^e; pixels: height x width x 3, BGR |
+| 24 | | consensus: K numbers, float16 ones after an i16 e and times 2^e, then 2 x u32 for each link that is |
+|    | | down, its number and a frame; pixels: height x width x 3, BGR; state: mean, upper triangle of the |
+|    | | covariance, looks |
 
 Reading never trusts: what is not exactly such a message is refused with its reason.
 """
@@ -19,7 +23,6 @@ Reading never trusts: what is not exactly such a message is refused with its rea
 import json
 import struct
 from functools import lru_cache
-from hashlib import blake2b
 from typing import Any, TypeVar
 
 import numpy as np
@@ -27,6 +30,7 @@ from jaxtyping import Float, Int
 from pydantic import TypeAdapter, ValidationError
 
 from network.errors import RefusedMessage
+from network.header import HEADER, TELLS_DOWN, read_header, write_header
 from network.messages import (
     ConfirmMessage,
     ConsensusMessage,
@@ -36,25 +40,24 @@ from network.messages import (
     PeerMessage,
     PixelsMessage,
     PublicMessage,
+    StateMessage,
     StatusMessage,
     TruthMessage,
 )
 from network.quantization import ENCODINGS, LARGEST, Encoding, half_exponent
 
-VERSION = 1
 MAX_PIXELS = 64_000_000
 MAX_JSON_BYTES = 1_000_000
 MAX_MAGNITUDE = LARGEST["float64"]
 """Larger numbers are refused like infinity: sums and products of them would overflow."""
 
-_HEADER = struct.Struct("<BBHHHQII")
 _NUMBERS: dict[Encoding, np.dtype[np.floating]] = {
     "float64": np.dtype("<f8"),
     "float32": np.dtype("<f4"),
     "float16": np.dtype("<f2"),
 }
 _EXPONENT = struct.Struct("<h")
-_KINDS: dict[type[PeerMessage], int] = {ConsensusMessage: 1, PixelsMessage: 2, ConfirmMessage: 3}
+_DOWN = struct.Struct("<II")
 _JSON: dict[type, TypeAdapter[Any]] = {
     kind: TypeAdapter(kind) for kind in (EstimateMessage, ControlMessage, StatusMessage, TruthMessage)
 }
@@ -76,6 +79,8 @@ def encode(run: str, message: Message) -> bytes:
             return encode_pixels(run, message)
         case ConfirmMessage():
             return encode_confirm(run, message)
+        case StateMessage():
+            return encode_state(run, message)
         case _:
             return encode_public(message)
 
@@ -96,6 +101,8 @@ def decode(kind: type[PeerMessage], run: str, sender: str, data: bytes) -> PeerM
         return decode_consensus(run, sender, data)
     if kind is PixelsMessage:
         return decode_pixels(run, sender, data)
+    if kind is StateMessage:
+        return decode_state(run, sender, data)
     return decode_confirm(run, sender, data)
 
 
@@ -110,12 +117,14 @@ def encode_consensus(run: str, message: ConsensusMessage) -> bytes:
         raise ValueError(
             f"{message.sender} has a value that is not finite in frame {message.frame}: {payload}"
         )
-    header = _header(run, message, payload.size, message.round, message.degree, message.encoding)
+    code = ENCODINGS.index(message.encoding) << 4 | (TELLS_DOWN if message.down else 0)
+    header = write_header(run, message, payload.size, message.round, message.degree, code)
     scale = b""
     if message.encoding == "float16":
         exponent = half_exponent(payload)
         payload, scale = np.ldexp(payload, -exponent), _EXPONENT.pack(exponent)
-    return header + scale + payload.astype(_NUMBERS[message.encoding], copy=False).tobytes()
+    numbers = payload.astype(_NUMBERS[message.encoding], copy=False).tobytes()
+    return header + scale + numbers + b"".join(_DOWN.pack(*report) for report in message.down)
 
 
 def decode_consensus(run: str, sender: str, data: bytes) -> ConsensusMessage:
@@ -124,9 +133,12 @@ def decode_consensus(run: str, sender: str, data: bytes) -> ConsensusMessage:
     Raises:
         RefusedMessage: The data are not such a message.
     """
-    frame, size, round_, degree, encoding = _read_header(ConsensusMessage, run, sender, data)
-    number, start = _NUMBERS[encoding], _HEADER.size + _EXPONENT.size * (encoding == "float16")
-    if len(data) != start + number.itemsize * size:
+    frame, size, round_, degree, code = read_header(ConsensusMessage, run, sender, data)
+    encoding = ENCODINGS[code >> 4 & 0x07]
+    number, start = _NUMBERS[encoding], HEADER.size + _EXPONENT.size * (encoding == "float16")
+    end = start + number.itemsize * size
+    told = len(data) - end
+    if told % _DOWN.size or told < 0 or (told > 0) != bool(code & TELLS_DOWN):
         raise RefusedMessage("length")
     if round_ < 1:
         raise RefusedMessage("round")
@@ -135,19 +147,20 @@ def decode_consensus(run: str, sender: str, data: bytes) -> ConsensusMessage:
         payload = payload.astype(float)
         if encoding == "float16":
             # an exponent beyond all floats gives infinity, which is refused
-            (exponent,) = _EXPONENT.unpack_from(data, _HEADER.size)
+            (exponent,) = _EXPONENT.unpack_from(data, HEADER.size)
             with np.errstate(over="ignore", invalid="ignore"):
                 payload = np.ldexp(payload, exponent)
         payload.flags.writeable = False
     if not _usable(payload):
         raise RefusedMessage("not-finite")
-    return ConsensusMessage(sender, frame, round_, degree, payload, encoding)
+    down = tuple(_DOWN.iter_unpack(data[end:])) if told else ()
+    return ConsensusMessage(sender, frame, round_, degree, payload, encoding, down)
 
 
 def encode_pixels(run: str, message: PixelsMessage) -> bytes:
     """A picture in bytes."""
     height, width, _ = message.image.shape
-    return b"".join((_header(run, message, height, width, 0), np.ascontiguousarray(message.image).data))
+    return b"".join((write_header(run, message, height, width, 0), np.ascontiguousarray(message.image).data))
 
 
 def decode_pixels(run: str, sender: str, data: bytes) -> PixelsMessage:
@@ -156,18 +169,18 @@ def decode_pixels(run: str, sender: str, data: bytes) -> PixelsMessage:
     Raises:
         RefusedMessage: The data are not such a message, or the picture has more than ``MAX_PIXELS``.
     """
-    frame, height, width, *_ = _read_header(PixelsMessage, run, sender, data)
+    frame, height, width, *_ = read_header(PixelsMessage, run, sender, data)
     if not 0 < height * width <= MAX_PIXELS:
         raise RefusedMessage("size")
-    if len(data) != _HEADER.size + 3 * height * width:
+    if len(data) != HEADER.size + 3 * height * width:
         raise RefusedMessage("length")
-    image = np.frombuffer(data, np.uint8, offset=_HEADER.size).reshape(height, width, 3)
+    image = np.frombuffer(data, np.uint8, offset=HEADER.size).reshape(height, width, 3)
     return PixelsMessage(sender, frame, image)
 
 
 def encode_confirm(run: str, message: ConfirmMessage) -> bytes:
     """A confirmation in bytes."""
-    return _header(run, message, 0, 0, 0)
+    return write_header(run, message, 0, 0, 0)
 
 
 def decode_confirm(run: str, sender: str, data: bytes) -> ConfirmMessage:
@@ -176,10 +189,45 @@ def decode_confirm(run: str, sender: str, data: bytes) -> ConfirmMessage:
     Raises:
         RefusedMessage: The data are not such a message.
     """
-    frame, *_ = _read_header(ConfirmMessage, run, sender, data)
-    if len(data) != _HEADER.size:
+    frame, *_ = read_header(ConfirmMessage, run, sender, data)
+    if len(data) != HEADER.size:
         raise RefusedMessage("length")
     return ConfirmMessage(sender, frame)
+
+
+def encode_state(run: str, message: StateMessage) -> bytes:
+    """What a node knows in bytes.
+
+    Raises:
+        ValueError: A number in it is not finite.
+    """
+    numbers = np.concatenate([message.mean, pack_symmetric(message.covariance), message.looks])
+    if not _usable(numbers):
+        raise ValueError(f"{message.sender} has a state that is not finite in frame {message.frame}")
+    header = write_header(run, message, message.mean.size, message.looks.size, 0)
+    return header + numbers.astype(_NUMBERS["float64"], copy=False).tobytes()
+
+
+def decode_state(run: str, sender: str, data: bytes) -> StateMessage:
+    """What a node knows.
+
+    Raises:
+        RefusedMessage: The data are not such a message, or its covariance is none.
+    """
+    frame, n_states, n_looks, _, _ = read_header(StateMessage, run, sender, data)
+    triangle = n_states * (n_states + 1) // 2
+    number = _NUMBERS["float64"]
+    if len(data) != HEADER.size + number.itemsize * (n_states + triangle + n_looks):
+        raise RefusedMessage("length")
+    numbers = np.frombuffer(data, number, offset=HEADER.size)
+    if not _usable(numbers):
+        raise RefusedMessage("not-finite")
+    mean, packed, looks = np.split(numbers, [n_states, n_states + triangle])
+    covariance = unpack_symmetric(packed, n_states)
+    least = np.linalg.eigvalsh(covariance).min(initial=0.0)
+    if least < -1e-9 * np.abs(covariance).max(initial=0.0):
+        raise RefusedMessage("covariance")
+    return StateMessage(sender, frame, mean, covariance, looks)
 
 
 def encode_public(message: PublicMessage) -> bytes:
@@ -241,32 +289,3 @@ def _usable(payload: Float[np.ndarray, " K"]) -> bool:
     """Whether all numbers are finite and small enough to compute with; not so for NaN."""
     # A round has so few that Python's own numbers are faster than NumPy's.
     return all(-MAX_MAGNITUDE <= number <= MAX_MAGNITUDE for number in payload.tolist())
-
-
-@lru_cache
-def _digest(name: str, size: int) -> int:
-    return int.from_bytes(blake2b(name.encode(), digest_size=size).digest(), "little")
-
-
-def _header(run: str, message: PeerMessage, a: int, b: int, c: int, encoding: Encoding = "float64") -> bytes:
-    code = _KINDS[type(message)] | ENCODINGS.index(encoding) << 4
-    return _HEADER.pack(VERSION, code, a, b, c, _digest(run, 8), _digest(message.sender, 4), message.frame)
-
-
-def _read_header(
-    kind: type[PeerMessage], run: str, sender: str, data: bytes
-) -> tuple[int, int, int, int, Encoding]:
-    """Frame, the three numbers that depend on the kind, and the encoding of the payload."""
-    if len(data) < _HEADER.size:
-        raise RefusedMessage("length")
-    version, code, a, b, c, run_id, sender_id, frame = _HEADER.unpack_from(data)
-    if version != VERSION:
-        raise RefusedMessage("version")
-    encoding = code >> 4
-    if code & 0x0F != _KINDS[kind] or encoding >= (len(ENCODINGS) if kind is ConsensusMessage else 1):
-        raise RefusedMessage("kind")
-    if run_id != _digest(run, 8):
-        raise RefusedMessage("run")
-    if sender_id != _digest(sender, 4):
-        raise RefusedMessage("sender")
-    return frame, a, b, c, ENCODINGS[encoding]

@@ -1,6 +1,6 @@
 """Messages: everything that nodes say to each other and to the outside, as frozen values.
 
-The first three travel as bytes between nodes, the others as JSON for anybody; ``network.codec`` turns both
+The first four travel as bytes between nodes, the others as JSON for anybody; ``network.codec`` turns both
 into bytes and back. ``kind`` is the last chunk of the key under which a message is sent.
 """
 
@@ -53,6 +53,7 @@ class ConsensusMessage:
         degree: How many neighbours the sender has in this round.
         payload: Its value after the rounds before this one, in the form that its algorithm gives it.
         encoding: How the payload's numbers are written; they are such as it holds exactly.
+        down: Links that were down: their numbers, each with a frame (`network.membership`).
     """
 
     kind: ClassVar[str] = "consensus"
@@ -62,6 +63,7 @@ class ConsensusMessage:
     degree: int
     payload: Float[np.ndarray, " K"]
     encoding: Encoding = "float64"
+    down: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +89,26 @@ class ConfirmMessage:
     kind: ClassVar[str] = "confirm"
     sender: str
     frame: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StateMessage:
+    """What a node knows of the target after a frame: an answer for a neighbour that was away.
+
+    Attributes:
+        sender: The node.
+        frame: Frame of the run.
+        mean: State as in its estimates.
+        covariance: Of the state.
+        looks: What the target looks like to it, as the cameras exchange it in frame 0.
+    """
+
+    kind: ClassVar[str] = "state"
+    sender: str
+    frame: int
+    mean: Float[np.ndarray, " D"]
+    covariance: Float[np.ndarray, "D D"]
+    looks: Float[np.ndarray, " K"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,7 +233,7 @@ class TruthMessage:
     visibility: dict[Name, Visibility]
 
 
-PeerMessage = ConsensusMessage | PixelsMessage | ConfirmMessage
+PeerMessage = ConsensusMessage | PixelsMessage | ConfirmMessage | StateMessage
 """What nodes say to each other, in bytes."""
 
 PublicMessage = EstimateMessage | ControlMessage | StatusMessage | TruthMessage

@@ -5,13 +5,14 @@ a camera lives in this file, in the order in which it happens (Jing & Chen, sect
 """
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
 from network.consensus import Consensus
-from network.messages import ConsensusMessage, EstimateMessage
+from network.messages import ConsensusMessage, EstimateMessage, StateMessage
 from nodes.array_estimator import ArrayEstimator
 from nodes.estimator import SirEstimator
 from nodes.filtering.appearance import Appearance, pack_looks, settled, unpack_looks
@@ -49,7 +50,6 @@ class SmartCamera:
         model: ObservationModel,
         setup: TrackingSetup,
         consensus: Consensus,
-        cameras: tuple[str, ...],
         single: SirEstimator | ArrayEstimator | None = None,
     ) -> None:
         """A camera before its first frame.
@@ -57,13 +57,12 @@ class SmartCamera:
         Args:
             model: The camera's observation model.
             setup: What the run tracks.
-            consensus: Its part of the averaging.
-            cameras: The cameras of the network.
+            consensus: Its part of the averaging, which knows who takes part.
             single: The camera's own filter beside, as a baseline.
         """
         self.name = model.camera.name
         self._indefinite: Counter[str] = Counter(indefinite_local=0, indefinite_fused=0)
-        self._model, self._setup, self._consensus, self._cameras = model, setup, consensus, set(cameras)
+        self._model, self._setup, self._consensus = model, setup, consensus
         self._motion = setup.motion
         self._fusion_rng = setup.stream(self.name, "fusion")
         self._local_rng = setup.stream(self.name, "local")
@@ -71,6 +70,7 @@ class SmartCamera:
         self._local_particles = setup.first_particles(self._local_rng)
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
+        self._estimate = setup.start.moments
         self._frame: FrameInProgress | None = None
         self._last_frame = 0
         self._single = single
@@ -100,12 +100,34 @@ class SmartCamera:
         return self._with_result(self._consensus.begin(index, pack(local, self._setup.fusion)))
 
     def on_message(self, message: ConsensusMessage) -> Outgoing:
-        """A neighbour's value of a round has come."""
+        """A neighbour's value of a round has come; one that was gone is counted on again."""
+        if message.sender in self._consensus.gone and message.frame >= self._last_frame:
+            self._consensus.restore(message.sender)
         return self._with_result(self._consensus.receive(message))
+
+    def on_return(self, image: UInt8[np.ndarray, "H W 3"], state: StateMessage) -> None:
+        """The camera was away: it goes on with what a neighbour knows.
+
+        Args:
+            image: What it sees now; the gain is measured against it where nothing was seen before.
+            state: The neighbour's state, of a frame before the next one.
+        """
+        setup = self._setup
+        if len(state.mean) != len(setup.start.mean):
+            return
+        known = Moments(state.mean, state.covariance)
+        self._particles = setup.particles(known, self._fusion_rng)
+        self._local_particles = setup.particles(known, self._local_rng)
+        self._last_frame = state.frame
+        self._sighting = Sighting()
+        if self._appearance is None:
+            self._model = self._model.with_first(image)
+            self._appearance = unpack_looks(state.looks, setup.filter.color)
+            # its own filter, the baseline, has nobody to ask
+            self._single = None
 
     def on_lost(self, neighbor: str) -> Outgoing:
         """A neighbour is gone: the rounds go on without it."""
-        self._cameras.discard(neighbor)
         return self._with_result(self._consensus.drop(neighbor))
 
     def on_deadline(self) -> Outgoing:
@@ -117,6 +139,23 @@ class SmartCamera:
     def waiting_for(self) -> tuple[str, ...]:
         """Neighbours without whose message the frame cannot go on; none when it is done."""
         return self._consensus.waiting_for()
+
+    @property
+    def gone(self) -> tuple[str, ...]:
+        """Neighbours that it goes on without; one that speaks again is counted on again."""
+        return self._consensus.gone
+
+    @property
+    def heard(self) -> Mapping[str, int]:
+        """The latest frame in which each neighbour has spoken, -1 for one that never has."""
+        return self._consensus.heard
+
+    @property
+    def state(self) -> StateMessage:
+        """What a neighbour that was away needs to know."""
+        looks = pack_looks(self._appearance, self._setup.filter.color)
+        mean, covariance = self._estimate.mean, self._estimate.covariance
+        return StateMessage(self.name, self._last_frame, mean, covariance, looks)
 
     @property
     def counters(self) -> Counters:
@@ -171,7 +210,8 @@ class SmartCamera:
         """The second half of a frame: the fusion filter on the network's average."""
         setup = self._setup
         # sum: N times the average (Eq. 15-16)
-        fused = unpack(self._consensus.value, len(self._cameras), len(setup.start.mean), setup.fusion)
+        members = self._consensus.members
+        fused = unpack(self._consensus.value, len(members), len(setup.start.mean), setup.fusion)
         self._indefinite["indefinite_fused"] += not fused.is_density
         # reweight, from the prior or the optimal proposal (Eq. 17)
         posterior = fuse(
@@ -179,6 +219,7 @@ class SmartCamera:
         )
         # estimate
         estimate = moments(posterior.states, posterior.weights)
+        self._estimate = estimate
         ess = effective_sample_size(posterior)
         prior = moments(frame.predicted.states, frame.predicted.weights)
         self._sighting = self._sighting.after(shrinkage_by(fused.gain, prior))
@@ -239,5 +280,5 @@ class SmartCamera:
             lost=self._sighting.lost,
             ess=ess,
             iterations=self._consensus.rounds_done,
-            members=tuple(sorted(self._cameras)),
+            members=self._consensus.members,
         )

@@ -11,6 +11,7 @@ from jaxtyping import Float, UInt8
 from network.averaging.algorithm import Algorithm
 from network.consensus import Consensus
 from network.graph import Graph
+from network.membership import Membership
 from network.messages import TruthMessage, Visibility
 from network.streams import stream
 from network.transport import Links, links_of
@@ -190,8 +191,14 @@ class Assembly:
         return SmartCamera(
             self.model_on_camera(name),
             self.setup,
-            Consensus(name, neighbors, self.algorithm, network.iterations, quantizer),
-            self.graph.names,
+            Consensus(
+                name,
+                neighbors,
+                self.algorithm,
+                network.iterations,
+                quantizer,
+                Membership(name, self.graph, network.iterations),
+            ),
             self.single(name),
         )
 

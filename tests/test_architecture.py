@@ -25,8 +25,10 @@ PURE = (
     *(
         ROOT / "network" / name
         for name in (
-            *("codec.py", "consensus.py", "errors.py", "graph.py", "keys.py", "memory.py"),
+            *("codec.py", "consensus.py", "errors.py", "graph.py", "header.py", "keys.py"),
             *(
+                "membership.py",
+                "memory.py",
                 "messages.py",
                 "options.py",
                 "quantization.py",
