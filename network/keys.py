@@ -54,6 +54,11 @@ def status(run: str, node: str = ANY) -> str:
     return _of_node(run, node, "status")
 
 
+def preview(run: str, node: str = ANY) -> str:
+    """Where a camera shows its pictures, while somebody looks."""
+    return _of_node(run, node, "preview")
+
+
 def alive(run: str, node: str = ANY) -> str:
     """The liveliness token of a node: it stands while the node can hear."""
     return _of_node(run, node, "alive")

@@ -24,6 +24,7 @@ from network.messages import (
     EstimateMessage,
     PeerMessage,
     PixelsMessage,
+    PreviewMessage,
     StatusMessage,
     TruthMessage,
 )
@@ -35,6 +36,7 @@ _ENCODINGS = {
     kind: f"application/json;dcpf.{kind.kind}.v1"
     for kind in (EstimateMessage, StatusMessage, ControlMessage, TruthMessage)
 }
+_PREVIEW_ENCODING = "image/jpeg"
 _WATCH_PERIOD_S = 0.01
 _WAKE_UP = b""
 
@@ -86,6 +88,7 @@ class ZenohTransport:
         self._session = sessions.open_peer(listen, connect)
         self._inboxes = {sender: self._declare_inbox(sender) for sender in self._heard}
         self._declare_orders()
+        self._watched = threading.Event()
         self._publishers = self._declare_publishers(drop_late_pixels=drop_late_pixels)
         self._declare_liveliness()
         threading.Thread(target=self._watch, name="watchdog", daemon=True).start()
@@ -118,7 +121,12 @@ class ZenohTransport:
             except RefusedMessage as refusal:
                 self.counters.refuse("control", refusal.reason)
 
-    def send(self, message: PeerMessage | EstimateMessage | StatusMessage) -> None:
+    @property
+    def watched(self) -> bool:
+        """Whether somebody looks at previews: they are sent only then."""
+        return self._watched.is_set()
+
+    def send(self, message: PeerMessage | EstimateMessage | StatusMessage | PreviewMessage) -> None:
         """Sends a message of this node to whom it concerns."""
         data = codec.encode(self._run, message)
         if isinstance(message, PeerMessage):
@@ -187,6 +195,14 @@ class ZenohTransport:
         )
         public = partial(publish, congestion_control=CongestionControl.BLOCK)
         pixels_control = CongestionControl.DROP if drop_late_pixels else CongestionControl.BLOCK
+        # Whoever looks too slowly misses pictures and holds nobody up.
+        preview = publish(
+            keys.preview(run, name),
+            encoding=_PREVIEW_ENCODING,
+            congestion_control=CongestionControl.DROP,
+            priority=Priority.DATA_LOW,
+        )
+        preview.declare_matching_listener(zenoh.handlers.Callback(self._on_watched))
         return {
             ConsensusMessage: rounds(keys.consensus(run, name)),
             ConfirmMessage: rounds(keys.confirm(run, name)),
@@ -195,7 +211,14 @@ class ZenohTransport:
             ),
             EstimateMessage: public(keys.estimate(run, name), encoding=_ENCODINGS[EstimateMessage]),
             StatusMessage: public(keys.status(run, name), encoding=_ENCODINGS[StatusMessage]),
+            PreviewMessage: preview,
         }
+
+    def _on_watched(self, status: zenoh.MatchingStatus) -> None:
+        if status.matching:
+            self._watched.set()
+        else:
+            self._watched.clear()
 
     def _declare_liveliness(self) -> None:
         self._session.liveliness().declare_subscriber(

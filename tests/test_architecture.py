@@ -19,12 +19,12 @@ PURE = (
     *sorted((ROOT / "nodes/filtering").glob("*.py")),
     *(
         ROOT / "nodes" / name
-        for name in ("camera.py", "central.py", "estimator.py", "setup.py", "smart_camera.py")
+        for name in ("camera.py", "central.py", "estimator.py", "preview.py", "setup.py", "smart_camera.py")
     ),
     *(
         ROOT / "network" / name
         for name in (
-            *("codec.py", "consensus.py", "errors.py", "graph.py", "keys.py", "memory.py"),
+            *("codec.py", "consensus.py", "errors.py", "graph.py", "jpeg.py", "keys.py", "memory.py"),
             *("messages.py", "options.py", "streams.py", "weights.py"),
         )
     ),

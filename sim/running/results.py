@@ -49,7 +49,7 @@ class Results:
             case TruthMessage():
                 self.truth[message.frame] = message
             case StatusMessage(state="running"):
-                self.first_statuses[message.node] = message
+                self.first_statuses.setdefault(message.node, message)
             case StatusMessage(state="done" | "failed"):
                 self.statuses[message.node] = message
 
