@@ -2,6 +2,8 @@
 
 import json
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,7 +25,7 @@ from sim.commands.shared import (
     yes_no,
 )
 from sim.running.in_process import run_in_process
-from sim.running.recorder import Recorder, default_folder
+from sim.running.recorder import Film, Recorder, default_folder
 from sim.running.results import Results, summarize
 from sim.scenario.model import Scenario
 
@@ -48,6 +50,9 @@ def run(
     fail_if_lost: Annotated[
         bool, typer.Option("--fail-if-lost", help="Exit with 1 if DCPF lost the target.")
     ] = False,
+    record: Annotated[
+        bool, typer.Option("--record", help="Record pictures and all as run.mcap, for Rerun and Foxglove.")
+    ] = False,
     as_json: AsJson = False,
 ) -> int:
     """Launch a scenario: one process a camera, the central node and a router; then compare DCPF with CPF."""
@@ -57,13 +62,17 @@ def run(
     # What is wrong with the start or the truth shall be said before anything is written.
     _ = assembly.start, assembly.truth
     _check_by_hand(by_hand or [], assembly, in_process=in_process)
-    with Recorder(folder, chosen) as recorder, progress_bar(f"{chosen.name}: frames", chosen.frames) as bar:
+    film = _film(assembly) if record else None
+    with (
+        Recorder(folder, chosen, film) as recorder,
+        progress_bar(f"{chosen.name}: frames", chosen.frames) as bar,
+    ):
         dead: list[str] = []
         if in_process:
             results = Results(chosen)
-            for message in run_in_process(assembly):
-                results.add(message)
+            for message in run_in_process(assembly, watched=record):
                 recorder.add(message)
+                results.add(message)
                 bar(results.frames_done)
         else:
             for node in by_hand or []:
@@ -83,6 +92,13 @@ def run(
         _print(summary, chosen, folder)
     lost = bool(summary["lost"]["dcpf"])
     return 1 if dead or (fail_if_lost and lost) else 0
+
+
+def _film(assembly: Assembly) -> Callable[[Path], Film]:
+    # The formats of a recording are for those who record.
+    from sim.recording.film import McapFilm
+
+    return partial(McapFilm, assembly=assembly)
 
 
 def _check_by_hand(names: list[str], assembly: Assembly, *, in_process: bool) -> None:

@@ -15,6 +15,7 @@ from network.messages import (
     EstimateMessage,
     Message,
     PixelsMessage,
+    PreviewMessage,
     StatusMessage,
     TruthMessage,
 )
@@ -23,14 +24,18 @@ from nodes.smart_camera import SmartCamera
 from nodes.telemetry import Telemetry
 from sim.assembly import Assembly
 
-Told = EstimateMessage | TruthMessage | StatusMessage
+Told = EstimateMessage | TruthMessage | StatusMessage | PreviewMessage
 """What a run tells the outside."""
 Nodes = Mapping[str, SmartCamera | Central]
 """The nodes of a run by name."""
 
 
-def run_in_process(assembly: Assembly) -> Iterator[Told]:
+def run_in_process(assembly: Assembly, *, watched: bool = False) -> Iterator[Told]:
     """Runs a scenario and yields what it would publish, frame after frame.
+
+    Args:
+        assembly: The run.
+        watched: Whether somebody looks at the cameras' pictures.
 
     Raises:
         SourceError: A video cannot be read.
@@ -46,15 +51,17 @@ def run_in_process(assembly: Assembly) -> Iterator[Told]:
     network = MemoryNetwork(scenario.name, assembly.links)
     telemetry = {name: Telemetry() for name in nodes}
     for frame in range(scenario.frames):
+        images = {name: source.read(frame) for name, source in sources.items()}
         for name, camera in cameras.items():
-            image = sources[name].read(frame)
             if central is not None:
-                network.post(name, PixelsMessage(name, frame, image))
+                network.post(name, PixelsMessage(name, frame, images[name]))
             began = time.perf_counter()
-            outgoing = camera.on_frame(frame, image)
+            outgoing = camera.on_frame(frame, images[name])
             telemetry[name].local_filter_s.append(time.perf_counter() - began)
             yield from _speak(network, name, outgoing)
         yield from _converse(network, nodes)
+        if watched:
+            yield from (camera.preview(frame, images[name]) for name, camera in cameras.items())
         truth = assembly.truth_message(frame)
         if truth is not None:
             yield truth

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from network.messages import EstimateMessage, StatusMessage, TruthMessage
+from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from sim.running.metrics import LOST_FRAMES, anees, disagreement, is_lost, position_errors, rmse
 from sim.scenario.model import Scenario
 
@@ -41,8 +41,8 @@ class Results:
         """Frames of which something is known."""
         return 1 + max((max(found) for found in self.tracks.values()), default=-1)
 
-    def add(self, message: EstimateMessage | TruthMessage | StatusMessage) -> None:
-        """Takes what a node, or the world, has told."""
+    def add(self, message: EstimateMessage | TruthMessage | StatusMessage | PreviewMessage) -> None:
+        """Takes what a node, or the world, has told; pictures are no results."""
         match message:
             case EstimateMessage():
                 self.tracks.setdefault((message.estimator, message.node), {})[message.frame] = message
