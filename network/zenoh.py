@@ -259,6 +259,19 @@ class ZenohTransport:
                 )
 
 
+def publish_again(session: zenoh.Session, key: str, data: bytes) -> None:
+    """Publishes what was told in a run, byte for byte, from outside the nodes."""
+    _, _, kind = key.rpartition("/")
+    picture = kind == PreviewMessage.kind
+    session.put(
+        key,
+        data,
+        encoding=_PREVIEW_ENCODING if picture else f"application/json;dcpf.{kind}.v1",
+        congestion_control=CongestionControl.DROP if picture else CongestionControl.BLOCK,
+        priority=Priority.DATA_LOW if picture else Priority.DATA,
+    )
+
+
 def publish(session: zenoh.Session, run: str, message: ControlMessage | TruthMessage) -> None:
     """Publishes a message about a whole run, from outside the nodes."""
     key = keys.control(run) if isinstance(message, ControlMessage) else keys.truth(run)

@@ -27,9 +27,14 @@ def preview(
         image: The picture, BGR.
         particles: Of the fusion filter, after the frame.
     """
-    _, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     shown = thinned(particles, N_SHOWN).round(_DECIMALS)
-    return PreviewMessage(run, node, frame, time_s, shown, jpeg.tobytes())
+    return PreviewMessage(run, node, frame, time_s, shown, encode_jpeg(image))
+
+
+def encode_jpeg(image: UInt8[np.ndarray, "H W 3"]) -> bytes:
+    """A picture, BGR, as JPEG."""
+    _, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return jpeg.tobytes()
 
 
 def thinned(particles: Particles, n: int) -> Float[np.ndarray, "M A"]:

@@ -13,6 +13,7 @@ from sim.commands.compare import compare
 from sim.commands.guard import guarded
 from sim.commands.inspect import check, footage, schema
 from sim.commands.node import central, node
+from sim.commands.replay import replay
 from sim.commands.run import run
 from sim.commands.watch import watch
 
@@ -24,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (run, watch, compare, clip, node, central, check, schema, footage):
+for command in (run, watch, compare, replay, clip, node, central, check, schema, footage):
     app.command()(guarded(command))
 
 

@@ -1,0 +1,135 @@
+"""Plays a recording over Zenoh: the same keys, the same bytes, nodes that come and go, at any speed.
+
+The replay is the run's router and all of its nodes at once: whoever listens cannot tell it from a run.
+"""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Protocol
+
+import zenoh
+
+from network import keys, sessions
+from network.zenoh import publish_again
+from sim.recording.playback import Playback
+from sim.running.recorder import expected_tracks
+from sim.scenario.model import Scenario
+
+LISTENERS_S = 1.0
+"""How long the first frame waits for somebody who listens."""
+MOMENT_S = 0.005
+
+
+class Recording(Protocol):
+    """What was told in a run.
+
+    Attributes:
+        scenario: As run.
+        frames: How many are recorded.
+    """
+
+    scenario: Scenario
+    frames: int
+
+    def at(self, frame: int, *, pictures: bool) -> Iterator[tuple[str, bytes]]:
+        """What was told of a frame: keys of the network and payloads."""
+
+    def alive_at(self, frame: int) -> set[str] | None:
+        """The nodes that were heard of at a frame; None where nobody listened for them."""
+
+    def close(self) -> None:
+        """Gives back what it holds open."""
+
+
+class Replay:
+    """A recording that is played.
+
+    Attributes:
+        playback: Where it stands; may be replaced by `steer` at any time.
+    """
+
+    def __init__(self, recording: Recording, endpoint: str, playback: Playback) -> None:
+        """Opens the router where the run's was, or elsewhere.
+
+        Args:
+            recording: What is played.
+            endpoint: Where listeners find it.
+            playback: Where it begins, and how fast.
+
+        Raises:
+            NetworkError: The endpoint cannot be had.
+        """
+        self.playback = playback
+        self._recording = recording
+        self._steering = threading.Lock()
+        self._session = sessions.open_router([endpoint])
+        run = recording.scenario.name
+        self._previews = [
+            self._session.declare_publisher(keys.preview(run, camera.name))
+            for camera in recording.scenario.cameras
+        ]
+        self._nodes = {node for _, node in expected_tracks(recording.scenario)}
+        self._listened = self._session.declare_publisher(keys.estimate(run, min(self._nodes)))
+        self._tokens: dict[str, zenoh.LivelinessToken] = {}
+        self._told = -1
+
+    def run(self, stopped: threading.Event, progress: Callable[[int], None], *, stay: bool) -> None:
+        """Plays until the end, or until it is stopped.
+
+        Args:
+            stopped: Set from outside to end it.
+            progress: Told how many frames have been played.
+            stay: Whether it stays at the end, for somebody who may turn it back.
+        """
+        self._show_nodes(0)
+        limit = time.monotonic() + LISTENERS_S
+        while not self._listened.matching_status.matching and time.monotonic() < limit:
+            stopped.wait(MOMENT_S)
+        if not stay:
+            self.steer(Playback.play)
+        while not stopped.wait(MOMENT_S):
+            now = time.monotonic()
+            with self._steering:
+                playback = self.playback
+            self._tell(playback.frame(now))
+            progress(self._told + 1)
+            if playback.ended(now) and not stay:
+                return
+
+    def steer(self, change: Callable[[Playback, float], Playback]) -> Playback:
+        """Changes how it is played; returns how it is now."""
+        with self._steering:
+            self.playback = change(self.playback, time.monotonic())
+            return self.playback
+
+    def close(self) -> None:
+        """Leaves the network."""
+        sessions.close(self._session)
+        self._recording.close()
+
+    def _tell(self, frame: int) -> None:
+        """Tells everything up to a frame; of one that was jumped to, only that."""
+        if frame == self._told:
+            return
+        onwards = self._told < frame <= self._told + self._recording.scenario.rate_hz
+        for index in range(self._told + 1, frame + 1) if onwards else (frame,):
+            self._show_nodes(index)
+            # whoever plays faster than can be looked at sees the last picture
+            pictures = index == frame and self._looked_at()
+            for key, data in self._recording.at(index, pictures=pictures):
+                publish_again(self._session, key, data)
+        self._told = frame
+
+    def _looked_at(self) -> bool:
+        return any(publisher.matching_status.matching for publisher in self._previews)
+
+    def _show_nodes(self, frame: int) -> None:
+        """Nodes that are there at a frame have their token."""
+        heard = self._recording.alive_at(frame)
+        alive = self._nodes if heard is None else heard & self._nodes
+        for node in alive - self._tokens.keys():
+            token = self._session.liveliness().declare_token(keys.alive(self._recording.scenario.name, node))
+            self._tokens[node] = token
+        for node in self._tokens.keys() - alive:
+            self._tokens.pop(node).undeclare()
