@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Iterable, Sequence
 from functools import partial
+from typing import Any
 
 import zenoh
 from zenoh import CongestionControl, Locality, Priority
@@ -257,6 +258,12 @@ class ZenohTransport:
                 self._session.put(
                     self._inbox_keys[sender], _WAKE_UP, allowed_destination=Locality.SESSION_LOCAL
                 )
+
+
+def has_listeners(publisher: zenoh.Publisher) -> bool:
+    """Whether anybody subscribes to what a publisher publishes."""
+    status: Any = publisher.matching_status  # not a bool, whatever Zenoh's types say: always true as one
+    return bool(status.matching)
 
 
 def publish_again(session: zenoh.Session, key: str, data: bytes) -> None:

@@ -1,4 +1,4 @@
-"""The folder of a run as a recording: its estimates and its truth; pictures come from where the run's came."""
+"""The folder of a run as a recording: estimates and truth; pictures come from where the run's came."""
 
 import json
 from collections.abc import Iterator

@@ -61,5 +61,4 @@ def _readable(damaged: IO[bytes]) -> Iterator[McapRecord]:
     """The records up to the end of the data, or to the first damage."""
     # readers and decompressors raise whatever comes to them; chunks are checked by their sums
     with suppress(Exception):
-        for record in StreamReader(damaged, validate_crcs=True).records:
-            yield record
+        yield from StreamReader(damaged, validate_crcs=True).records

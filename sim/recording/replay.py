@@ -11,7 +11,7 @@ from typing import Protocol
 import zenoh
 
 from network import keys, sessions
-from network.zenoh import publish_again
+from network.zenoh import has_listeners, publish_again
 from sim.recording.playback import Playback
 from sim.running.recorder import expected_tracks
 from sim.scenario.model import Scenario
@@ -84,7 +84,7 @@ class Replay:
         """
         self._show_nodes(0)
         limit = time.monotonic() + LISTENERS_S
-        while not self._listened.matching_status.matching and time.monotonic() < limit:
+        while not has_listeners(self._listened) and time.monotonic() < limit:
             stopped.wait(MOMENT_S)
         if not stay:
             self.steer(Playback.play)
@@ -122,7 +122,7 @@ class Replay:
         self._told = frame
 
     def _looked_at(self) -> bool:
-        return any(publisher.matching_status.matching for publisher in self._previews)
+        return any(map(has_listeners, self._previews))
 
     def _show_nodes(self, frame: int) -> None:
         """Nodes that are there at a frame have their token."""
@@ -132,4 +132,4 @@ class Replay:
             token = self._session.liveliness().declare_token(keys.alive(self._recording.scenario.name, node))
             self._tokens[node] = token
         for node in self._tokens.keys() - alive:
-            self._tokens.pop(node).undeclare()
+            self._tokens.pop(node).undeclare()  # type: ignore[no-untyped-call]
