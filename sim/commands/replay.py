@@ -1,12 +1,14 @@
 """`dcpf replay`: plays a recorded run through the keys that it had."""
 
 import threading
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
+from sim.assembly import Assembly
+from sim.commands.live import DEFAULT_PORT, LOOPBACK, Bind, Live, Port, page, say
 from sim.commands.shared import progress_bar
 
 
@@ -25,6 +27,9 @@ def replay(
             metavar="ENDPOINT", help="Zenoh endpoint to listen on.", show_default="the run's router"
         ),
     ] = None,
+    live: Live = False,
+    port: Port = DEFAULT_PORT,
+    bind: Bind = LOOPBACK,
 ) -> None:
     """Play a recorded run over Zenoh: estimates, truth, pictures, nodes that come and go."""
     # Zenoh and the formats of recordings take their time to import.
@@ -32,14 +37,15 @@ def replay(
     from sim.recording.playback import Playback
     from sim.recording.replay import Replay
 
-    recording = open_recording(run)
-    endpoint = listen or recording.scenario.network.router
-    playback = Playback(recording.frames, recording.scenario.rate_hz, loop=loop, speed=speed)
-    player = Replay(recording, endpoint, playback)
-    try:
-        where = f"{recording.scenario.name}: {recording.frames} frames at {endpoint}; Ctrl-C ends"
-        Console(stderr=True).print(where, highlight=False, markup=False, soft_wrap=True)
-        with progress_bar(f"{recording.scenario.name}: frames", recording.frames) as bar:
-            player.run(threading.Event(), bar, stay=False)
-    finally:
-        player.close()
+    with closing(open_recording(run)) as recording, ExitStack() as stack:
+        scenario = recording.scenario
+        endpoint = listen or scenario.network.router
+        playback = Playback(recording.frames, scenario.rate_hz, loop=loop, speed=speed)
+        player = stack.enter_context(closing(Replay(recording, endpoint, playback)))
+        say(f"{scenario.name}: {recording.frames} frames at {endpoint}; Ctrl-C ends")
+        audience = None
+        if live:
+            server = stack.enter_context(page(Assembly(scenario), endpoint, (bind, port), player.steered))
+            audience = server.wait_for_audience
+        bar = stack.enter_context(progress_bar(f"{scenario.name}: frames", recording.frames))
+        player.run(threading.Event(), bar, audience)

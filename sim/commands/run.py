@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,6 +14,7 @@ from rich.table import Table
 
 from sim.assembly import Assembly
 from sim.commands import BEGAN_S
+from sim.commands.live import DEFAULT_PORT, LOOPBACK, Bind, Live, Port, page, wait_for_audience
 from sim.commands.shared import (
     AsJson,
     Frames,
@@ -53,6 +55,9 @@ def run(
     record: Annotated[
         bool, typer.Option("--record", help="Record pictures and all as run.mcap, for Rerun and Foxglove.")
     ] = False,
+    live: Live = False,
+    port: Port = DEFAULT_PORT,
+    bind: Bind = LOOPBACK,
     as_json: AsJson = False,
 ) -> int:
     """Launch a scenario: one process a camera, the central node and a router; then compare DCPF with CPF."""
@@ -62,11 +67,15 @@ def run(
     # What is wrong with the start or the truth shall be said before anything is written.
     _ = assembly.start, assembly.truth
     _check_by_hand(by_hand or [], assembly, in_process=in_process)
-    film = _film(assembly) if record else None
-    with (
-        Recorder(folder, chosen, film) as recorder,
-        progress_bar(f"{chosen.name}: frames", chosen.frames) as bar,
-    ):
+    if live and in_process:
+        raise typer.BadParameter("with --in-process, nothing goes over the network", param_hint="--live")
+    with ExitStack() as stack:
+        audience = None
+        if live:
+            server = stack.enter_context(page(assembly, chosen.network.router, (bind, port)))
+            audience = partial(wait_for_audience, server)
+        recorder = stack.enter_context(Recorder(folder, chosen, _film(assembly) if record else None))
+        bar = stack.enter_context(progress_bar(f"{chosen.name}: frames", chosen.frames))
         dead: list[str] = []
         if in_process:
             results = Results(chosen)
@@ -81,7 +90,7 @@ def run(
             # Zenoh is imported by those who need it: it takes its time.
             from sim.running.launcher import Launch
 
-            launch = Launch(assembly, recorder, bar, by_hand or [], BEGAN_S)
+            launch = Launch(assembly, recorder, bar, by_hand or [], BEGAN_S, audience=audience)
             results, dead = launch.run(), launch.dead
         summary = summarize(results, processes=1 if in_process else chosen.n_processes)
         summary["died"] = dead

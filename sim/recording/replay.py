@@ -5,8 +5,8 @@ The replay is the run's router and all of its nodes at once: whoever listens can
 
 import threading
 import time
-from collections.abc import Callable, Iterator
-from typing import Protocol
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Protocol
 
 import zenoh
 
@@ -74,39 +74,67 @@ class Replay:
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
         self._told = -1
 
-    def run(self, stopped: threading.Event, progress: Callable[[int], None], *, stay: bool) -> None:
+    def run(
+        self,
+        stopped: threading.Event,
+        progress: Callable[[int], None],
+        audience: Callable[[float], bool] | None = None,
+    ) -> None:
         """Plays until the end, or until it is stopped.
 
         Args:
             stopped: Set from outside to end it.
             progress: Told how many frames have been played.
-            stay: Whether it stays at the end, for somebody who may turn it back.
+            audience: Waits so many seconds for somebody who looks on, if there will be any: playing begins
+                with them, and it stays at the end, for they may turn it back.
         """
         self._show_nodes(0)
-        limit = time.monotonic() + LISTENERS_S
-        while not has_listeners(self._listened) and time.monotonic() < limit:
-            stopped.wait(MOMENT_S)
-        if not stay:
-            self.steer(Playback.play)
+        ready = audience or self._wait_for_listeners
+        while not ready(LISTENERS_S) and audience and not stopped.is_set():
+            pass
+        self.steer(Playback.play)
         while not stopped.wait(MOMENT_S):
             now = time.monotonic()
-            with self._steering:
-                playback = self.playback
+            playback = self.playback
             self._tell(playback.frame(now))
             progress(self._told + 1)
-            if playback.ended(now) and not stay:
+            if playback.ended(now) and audience is None:
                 return
 
-    def steer(self, change: Callable[[Playback, float], Playback]) -> Playback:
-        """Changes how it is played; returns how it is now."""
+    def _wait_for_listeners(self, timeout_s: float) -> bool:
+        limit = time.monotonic() + timeout_s
+        while not has_listeners(self._listened) and time.monotonic() < limit:
+            time.sleep(MOMENT_S)
+        return has_listeners(self._listened)
+
+    def steered(self, order: Mapping[str, Any]) -> dict[str, Any]:
+        """Obeys an order of the page, if it is one, and tells how the playback is."""
+        match order:
+            case {"order": "play"}:
+                self.steer(Playback.play)
+            case {"order": "pause"}:
+                self.steer(Playback.pause)
+            case {"order": "seek", "value": int(frame)}:
+                self.steer(lambda playback, now: playback.seek(frame, now))
+            case {"order": "speed", "value": int(speed) | float(speed)}:
+                self.steer(lambda playback, now: playback.at_speed(float(speed), now))
+        now, playback = time.monotonic(), self.playback
+        return {
+            "type": "playback",
+            "frame": playback.frame(now),
+            "frames": playback.frames,
+            "paused": playback.paused or playback.ended(now),
+            "speed": playback.speed,
+        }
+
+    def steer(self, change: Callable[[Playback, float], Playback]) -> None:
+        """Changes how it is played."""
         with self._steering:
             self.playback = change(self.playback, time.monotonic())
-            return self.playback
 
     def close(self) -> None:
         """Leaves the network."""
         sessions.close(self._session)
-        self._recording.close()
 
     def _tell(self, frame: int) -> None:
         """Tells everything up to a frame; of one that was jumped to, only that."""

@@ -46,7 +46,7 @@ class Launch:
         by_hand: Sequence[str],
         began: float,
         *,
-        live: bool = False,
+        audience: Callable[[], None] | None = None,
     ) -> None:
         """A run that has not begun.
 
@@ -56,10 +56,11 @@ class Launch:
             progress: Told how far it is.
             by_hand: Nodes that somebody else starts.
             began: When the user's command began, on the monotonic clock.
-            live: Whether somebody looks on.
+            audience: Waits for those who look on, if there are any; the frames start when it is back.
         """
         self._began = began
-        self._watched = live or recorder.filming
+        self._audience = audience
+        self._watched = audience is not None or recorder.filming
         self.results = Results(assembly.scenario)
         self.dead: list[str] = []
         self._assembly, self._recorder, self._progress, self._by_hand = assembly, recorder, progress, by_hand
@@ -97,6 +98,8 @@ class Launch:
             stack.callback(publish, session, self._assembly.scenario.name, ControlMessage("stop"))
             self._listen(session)
             self._wait_until_ready(children)
+            if self._audience is not None:
+                self._audience()
             self._start(session)
             started = self._last_heard = time.monotonic()
             for message in self._messages(children):
