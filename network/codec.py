@@ -209,11 +209,12 @@ def decode_preview(data: bytes) -> PreviewMessage:
     """
     if len(data) > MAX_JPEG_BYTES:
         raise RefusedMessage("length")
-    comment = jpeg.comment_of(data)
-    if comment is None:
+    parts = jpeg.without_comment(data)
+    if parts is None:
         raise RefusedMessage("jpeg")
+    picture, comment = parts
     message: PreviewMessage = _from_json(PreviewMessage, comment)
-    return replace(message, jpeg=data)
+    return replace(message, jpeg=picture)
 
 
 def pack_symmetric(matrix: Float[np.ndarray, "D D"]) -> Float[np.ndarray, " K"]:

@@ -31,8 +31,8 @@ def with_comment(jpeg: bytes, comment: bytes) -> bytes:
     return b"".join((jpeg[:place], _SEGMENT.pack(0xFF, _COMMENT, len(comment) + 2), comment, jpeg[place:]))
 
 
-def comment_of(jpeg: bytes) -> bytes | None:
-    """The first comment of a picture; None if there is none, or it is no JPEG."""
+def without_comment(jpeg: bytes) -> tuple[bytes, bytes] | None:
+    """A picture without its first comment, and the comment; None if there is none, or it is no JPEG."""
     if not jpeg.startswith(_START):
         return None
     place = 2
@@ -41,6 +41,6 @@ def comment_of(jpeg: bytes) -> bytes | None:
         if marker != 0xFF or kind == _SCAN or length < 2 or place + 2 + length > len(jpeg):
             return None
         if kind == _COMMENT:
-            return jpeg[place + 4 : place + 2 + length]
+            return jpeg[:place] + jpeg[place + 2 + length :], jpeg[place + 4 : place + 2 + length]
         place += 2 + length
     return None

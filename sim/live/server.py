@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 from websockets.asyncio.server import ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from network import codec, keys
@@ -114,8 +115,9 @@ class LiveServer:
         serving.add_done_callback(lambda _: asyncio.ensure_future(connection.close()))
         self._audience.set()
         try:
-            async for words in connection:
-                self._obey(viewer, words)
+            with suppress(ConnectionClosed):
+                async for words in connection:
+                    self._obey(viewer, words)
         finally:
             self._viewers.discard(viewer)
             self._look()

@@ -13,6 +13,7 @@ process that dies takes the last of them along and no more.
 
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -57,8 +58,15 @@ class McapFilm:
         self._file: BinaryIO = self.path.open("wb")
         self._writer = Writer(self._file, CHUNK_BYTES, CompressionType.ZSTD)
         self._writer.start(profile="", library="dcpf")
-        scenario = self.assembly.scenario
-        attached = scenario.model_dump_json().encode()
+        try:
+            self._show_setting()
+        except OSError:
+            self._abandon()
+            raise
+
+    def _show_setting(self) -> None:
+        """What stays the same: the scenario, the cameras, the graph."""
+        attached = self.assembly.scenario.model_dump_json().encode()
         self._writer.add_attachment(0, 0, SCENARIO, "application/json", attached)
         cameras = list(self.assembly.cameras.values())
         self._show("/tf", foxglove.transforms(cameras, 0.0), 0.0)
@@ -110,8 +118,14 @@ class McapFilm:
         if not self._file.closed:
             try:
                 self._writer.finish()  # type: ignore[no-untyped-call]
-            finally:
                 self._file.close()
+            finally:
+                self._abandon()
+
+    def _abandon(self) -> None:
+        """Closes the file as it is."""
+        with suppress(OSError):
+            self._file.close()
 
     def _begin(self, time_s: float) -> None:
         """A frame begins: what was told before is in the file from now on."""
@@ -143,7 +157,9 @@ class McapFilm:
 
     def _show_preview(self, message: PreviewMessage, time_s: float) -> None:
         target = self.assembly.scenario.target
-        self._show(f"/{message.node}/image", foxglove.image(message.node, message.jpeg, time_s), time_s)
+        # the picture as it was sent, comment and all
+        picture = foxglove.image(message.node, codec.encode_preview(message), time_s)
+        self._show(f"/{message.node}/image", picture, time_s)
         if message.particles.shape[1] == target.n_axes:
             points = scene.in_world(message.particles, target)
             self._show(f"/{message.node}/particles", foxglove.point_cloud(points, time_s), time_s)

@@ -37,11 +37,13 @@ class McapRecording:
         """
         try:
             self._file = open_whole(path)
-            self._reader: McapReader = make_reader(self._file)
-            self.scenario = self._attached()
         except OSError as error:
             raise RecordingError(f"{path}: cannot be read: {error.strerror}: check the path") from error
+        self._reader: McapReader = make_reader(self._file)
+        try:
+            self.scenario = self._attached()
         except (McapError, ValidationError, StopIteration) as error:
+            self.close()
             raise RecordingError(
                 f"{path}: is no recording of a run: name one that `dcpf run --record` has written"
             ) from error

@@ -6,7 +6,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
-from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.records import Attachment, Channel, McapRecord, Message, Schema
 from mcap.stream_reader import StreamReader
@@ -20,9 +19,10 @@ def open_whole(path: Path) -> IO[bytes]:
         OSError: It cannot be read.
     """
     file = path.open("rb")
-    # a file without the end that it should have has no index at its place
-    with suppress(McapError, OSError, ValueError, StopIteration):
+    # where a file has not the end that it should have, the reader finds and raises whatever there is
+    with suppress(Exception):
         if make_reader(file).get_summary() is not None:
+            file.seek(0)
             return file
     with file:
         return recovered(file)
@@ -54,6 +54,7 @@ def recovered(damaged: IO[bytes]) -> IO[bytes]:
                     channel, record.log_time, record.data, record.publish_time, record.sequence
                 )
     writer.finish()  # type: ignore[no-untyped-call]
+    whole.seek(0)
     return whole
 
 

@@ -6,7 +6,7 @@ The replay is the run's router and all of its nodes at once: whoever listens can
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import zenoh
 
@@ -21,6 +21,7 @@ LISTENERS_S = 1.0
 MOMENT_S = 0.005
 
 
+@runtime_checkable
 class Recording(Protocol):
     """What was told in a run.
 

@@ -5,6 +5,7 @@ takes its place.
 """
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
@@ -95,9 +96,7 @@ def _entity(name: str, time_s: float) -> SceneEntity:
     return SceneEntity(timestamp=timestamp(time_s), frame_id=WORLD, id=name)
 
 
-def _line(
-    points: Float[np.ndarray, "N 3"], shade: str, kind: "LinePrimitive.Type.ValueType"
-) -> LinePrimitive:
+def _line(points: Float[np.ndarray, "N 3"], shade: str, kind: Any) -> LinePrimitive:
     return LinePrimitive(
         type=kind,
         pose=Pose(position=Vector3(), orientation=Quaternion(w=1.0)),

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Protocol, TextIO
+from typing import Any, Protocol, TextIO, runtime_checkable
 
 from network.codec import decode_public, encode_public
 from network.errors import RefusedMessage
@@ -43,6 +43,7 @@ FILM = "run.mcap"
 """The recording with pictures, in the folder of a run."""
 
 
+@runtime_checkable
 class Film(Protocol):
     """Records a run with its pictures as it goes; raises OSError where it cannot."""
 
@@ -72,6 +73,7 @@ class Recorder:
         """
         self.folder = folder
         self._film: Film | None = None
+        self._files: dict[str, TextIO] = {}
         self._expected = expected_tracks(scenario)
         self._waiting: dict[int, dict[Track, EstimateMessage]] = {}
         self._latest: dict[Track, int] = {}
@@ -82,13 +84,12 @@ class Recorder:
             for earlier in ("summary.json", FILM):
                 (folder / earlier).unlink(missing_ok=True)
             dump(_plain(scenario), folder / "scenario.yaml")
-            self._files: dict[str, TextIO] = {
-                name: (folder / f"{name}.jsonl").open("w", encoding="utf-8")
-                for name in ("estimates", "truth", "events")
-            }
+            for name in ("estimates", "truth", "events"):
+                self._files[name] = (folder / f"{name}.jsonl").open("w", encoding="utf-8")
             if film is not None:
                 self._film = film(folder / FILM)
         except OSError as error:
+            self.close()
             raise _cannot_write(folder, error) from error
 
     def __enter__(self) -> "Recorder":

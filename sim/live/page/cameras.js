@@ -60,11 +60,11 @@ class View {
     const { colors, labels, central } = story.setting;
     const line = Math.max(1.5, this.canvas.width * LINE_SHARE);
     context.drawImage(this.image, 0, 0, this.canvas.width, this.canvas.height);
-    this.particles(context, line);
     const frame = this.event.frame;
     this.box(context, boxOf(story, "truth", frame, this.name), "#000000", line, [2 * line, 2 * line]);
     this.box(context, central && boxOf(story, `cpf/${central}`, frame, this.name), colors.cpf, line, []);
     const seen = this.box(context, boxOf(story, `dcpf/${this.name}`, frame, this.name), colors.dcpf, line, []);
+    this.particles(context, line);
     this.words.textContent = seen ? `frame ${frame}` : `frame ${frame}, ${labels.dcpf} not in view`;
   }
 

@@ -130,11 +130,11 @@ const GOING_AWAY = 1001; // how a server that ends in order closes
 function connect() {
   socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/feed`);
   socket.binaryType = "arraybuffer";
-  socket.onopen = () => connection("connected", "alive");
+  socket.onopen = () => connection("● connected", "alive");
   socket.onmessage = ({ data }) => hear(data);
   socket.onclose = ({ code }) => {
     if (code === GOING_AWAY) return connection("the run has ended", "");
-    connection("connection lost, trying again", "lost");
+    connection("✕ connection lost, trying again", "lost");
     setTimeout(connect, 1000);
   };
 }

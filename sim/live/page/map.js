@@ -18,7 +18,7 @@ export class GroundMap {
     this.truthPath();
     this.estimates(setting);
     for (const camera of setting.cameras) this.camera(camera);
-    this.scaleBar(high[0] - low[0]);
+    this.scaleBar(setting, high[0] - low[0]);
   }
 
   at([x, y]) {
@@ -118,9 +118,16 @@ export class GroundMap {
     this.context.fillText(words, place, Math.min(Math.max(y - Math.sign(dy || 1) * 15 + 4, 14), this.height - 6));
   }
 
-  scaleBar(extent) {
+  // In the lower corner that is farther from all cameras.
+  scaleBar(setting, extent) {
     const length = roundStep(extent, 5);
-    const [left, bottom] = [12, this.height - 12];
+    const bottom = this.height - 12;
+    const corners = [12, this.width - 12 - length * this.scale];
+    const room = (left) => Math.min(...setting.cameras.map(({ position_m }) => {
+      const [x, y] = this.at(position_m);
+      return Math.hypot(x - left - 0.5 * length * this.scale, y - bottom);
+    }));
+    const left = room(corners[0]) >= room(corners[1]) ? corners[0] : corners[1];
     this.context.strokeStyle = this.context.fillStyle = this.color("ink");
     this.context.lineWidth = 2;
     this.context.beginPath();
