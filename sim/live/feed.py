@@ -15,7 +15,11 @@ Hear = Callable[[str, bytes, bool], None]
 
 
 class Feed:
-    """A subscriber from the outside."""
+    """A subscriber from the outside.
+
+    Attributes:
+        listening: Set when everything that is told is heard.
+    """
 
     def __init__(self, endpoint: str, run: str, hear: Hear) -> None:
         """Connects when a router is there, and again when it has gone and come back.
@@ -26,6 +30,7 @@ class Feed:
             hear: Called from Zenoh's threads.
         """
         self._endpoint, self._run, self._hear = endpoint, run, hear
+        self.listening = threading.Event()
         self._wanted, self._closed = False, threading.Event()
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._listen, name="feed", daemon=True)
@@ -42,7 +47,8 @@ class Feed:
         with self._changed:
             self._closed.set()
             self._changed.notify()
-        self._thread.join(LEAVE_S)
+        if self.listening.is_set():
+            self._thread.join(LEAVE_S)
 
     def _listen(self) -> None:
         """Everything of the session, in one thread: Zenoh wants it so."""
@@ -51,6 +57,7 @@ class Feed:
         for key in (keys.estimate(self._run), keys.status(self._run), keys.truth(self._run)):
             session.declare_subscriber(key, hear)
         session.liveliness().declare_subscriber(keys.alive(self._run), hear, history=True)
+        self.listening.set()
         looking = None
         while not self._closed.is_set():
             if self._wanted and looking is None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 import socket
 import threading
 import time
@@ -16,7 +17,7 @@ from websockets.http11 import Request, Response
 
 from network import codec, keys
 from network.errors import NetworkError, RefusedMessage
-from network.messages import EstimateMessage, StatusMessage, TruthMessage
+from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from sim.live.feed import Feed
 from sim.live.pages import answer
 from sim.live.story import Event, Story
@@ -51,10 +52,11 @@ class LiveServer:
             self._socket = socket.create_server(address, family=_family(address[0]))
         except OSError as error:
             raise NetworkError(
-                f"cannot serve the page on {address[0]} port {address[1]}: {error.strerror}:"
+                f"cannot serve the page on {address[0]} port {address[1]}: {os.strerror(error.errno or 0)}:"
                 " end what uses it, or choose another: --port 0 takes a free one"
             ) from error
         self._viewers: set[Viewer] = set()
+        self._pictures: dict[str, bytes] = {}
         self._audience = threading.Event()
         self._ended = asyncio.Event()
         self._feed: Feed | None = None
@@ -78,8 +80,11 @@ class LiveServer:
         self._feed = Feed(endpoint, run, self._hear)
 
     def wait_for_audience(self, timeout_s: float) -> bool:
-        """Waits until a browser has opened the page; False when time is up."""
-        return self._audience.wait(timeout_s)
+        """Waits until a browser has opened the page, and hears; False when time is up."""
+        limit = time.monotonic() + timeout_s
+        return self._audience.wait(timeout_s) and (
+            self._feed is None or self._feed.listening.wait(max(0.0, limit - time.monotonic()))
+        )
 
     def close(self) -> None:
         """Says goodbye to the browsers and gives the port back."""
@@ -109,6 +114,8 @@ class LiveServer:
         viewer = Viewer(connection)
         playback = [self._steer({})] if self._steer is not None else []
         viewer.tell(as_text([*self._story.so_far(), *playback]))
+        for node, picture in self._pictures.items():
+            viewer.show(node, picture)
         self._viewers.add(viewer)
         self._look()
         serving = asyncio.create_task(viewer.serve())
@@ -154,10 +161,10 @@ class LiveServer:
                 if isinstance(message, TruthMessage) or message.node == keys.node_of(key):
                     self._tell(self._story.take(message, time.monotonic()))
 
-    def _show(self, message: Any) -> None:
+    def _show(self, message: PreviewMessage) -> None:
         event = self._story.picture(message)
         if event is not None:
-            data = as_picture(event, message.jpeg)
+            data = self._pictures[message.node] = as_picture(event, message.jpeg)
             for viewer in self._viewers:
                 if viewer.looking:
                     viewer.show(message.node, data)

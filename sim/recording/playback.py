@@ -62,5 +62,6 @@ class Playback:
         return replace(self, speed=speed, anchor=self.position(now_s), anchor_s=now_s)
 
     def seek(self, frame: int, now_s: float) -> "Playback":
-        """Stands at, or goes on from, another frame; the nearest that there is."""
-        return replace(self, anchor=float(min(max(frame, 0), self.frames - 1)), anchor_s=now_s)
+        """Goes to another frame, the nearest that there is; where the end was reached, it stands there."""
+        anchor = float(min(max(frame, 0), self.frames - 1))
+        return replace(self, paused=self.paused or self.ended(now_s), anchor=anchor, anchor_s=now_s)

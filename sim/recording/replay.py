@@ -11,6 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 import zenoh
 
 from network import keys, sessions
+from network.messages import PreviewMessage
 from network.zenoh import has_listeners, publish_again
 from sim.recording.playback import Playback
 from sim.running.recorder import expected_tracks
@@ -73,7 +74,7 @@ class Replay:
         self._nodes = {node for _, node in expected_tracks(recording.scenario)}
         self._listened = self._session.declare_publisher(keys.estimate(run, min(self._nodes)))
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
-        self._told = -1
+        self._told, self._seen = -1, False
 
     def run(
         self,
@@ -90,9 +91,9 @@ class Replay:
                 with them, and it stays at the end, for they may turn it back.
         """
         self._show_nodes(0)
-        ready = audience or self._wait_for_listeners
-        while not ready(LISTENERS_S) and audience and not stopped.is_set():
+        while audience is not None and not audience(LISTENERS_S) and not stopped.is_set():
             pass
+        self._wait_for_listeners(LISTENERS_S)
         self.steer(Playback.play)
         while not stopped.wait(MOMENT_S):
             now = time.monotonic()
@@ -102,11 +103,10 @@ class Replay:
             if playback.ended(now) and audience is None:
                 return
 
-    def _wait_for_listeners(self, timeout_s: float) -> bool:
+    def _wait_for_listeners(self, timeout_s: float) -> None:
         limit = time.monotonic() + timeout_s
         while not has_listeners(self._listened) and time.monotonic() < limit:
             time.sleep(MOMENT_S)
-        return has_listeners(self._listened)
 
     def steered(self, order: Mapping[str, Any]) -> dict[str, Any]:
         """Obeys an order of the page, if it is one, and tells how the playback is."""
@@ -139,19 +139,29 @@ class Replay:
 
     def _tell(self, frame: int) -> None:
         """Tells everything up to a frame; of one that was jumped to, only that."""
+        before, self._seen = self._seen, any(map(has_listeners, self._previews))
         if frame == self._told:
+            if self._seen and not before:
+                self._publish(frame, lambda key: key.endswith(PreviewMessage.kind))  # somebody has come
             return
         onwards = self._told < frame <= self._told + self._recording.scenario.rate_hz
         for index in range(self._told + 1, frame + 1) if onwards else (frame,):
             self._show_nodes(index)
-            # whoever plays faster than can be looked at sees the last picture
-            pictures = index == frame and self._looked_at()
-            for key, data in self._recording.at(index, pictures=pictures):
-                publish_again(self._session, key, data)
+            self._publish(index, lambda _: True, pictures=self._seen and index == frame)
         self._told = frame
 
-    def _looked_at(self) -> bool:
-        return any(map(has_listeners, self._previews))
+    def _publish(self, frame: int, wanted: Callable[[str], bool], *, pictures: bool = True) -> None:
+        """Tells again what was told of a frame.
+
+        Args:
+            frame: The frame.
+            wanted: Which keys.
+            pictures: Whether there is any use for pictures: whoever plays faster than can be looked at sees
+                the last one only.
+        """
+        for key, data in self._recording.at(frame, pictures=pictures):
+            if wanted(key):
+                publish_again(self._session, key, data)
 
     def _show_nodes(self, frame: int) -> None:
         """Nodes that are there at a frame have their token."""

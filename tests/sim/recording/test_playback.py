@@ -55,6 +55,7 @@ def test_at_the_end_it_plays_from_the_beginning():
     ended = Playback(20, 10.0).play(0.0)
     assert ended.ended(5.0)
     assert ended.play(5.0).frame(5.15) == 1
+    assert ended.seek(3, 5.0).frame(9.0) == 3
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, float("inf"), float("nan")])
