@@ -2,6 +2,7 @@
 
 import threading
 from contextlib import ExitStack, closing
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ import typer
 from sim.assembly import Assembly
 from sim.commands.live import DEFAULT_PORT, LOOPBACK, Bind, Live, Port, page, say
 from sim.commands.shared import progress_bar
+from sim.running.recorder import RecordingError
 
 
 def replay(
@@ -27,15 +29,21 @@ def replay(
             metavar="ENDPOINT", help="Zenoh endpoint to listen on.", show_default="the run's router"
         ),
     ] = None,
+    rerun: Annotated[
+        bool, typer.Option("--rerun", help="Open it in Rerun instead (extra: pip install 'dcpf[rerun]').")
+    ] = False,
     live: Live = False,
     port: Port = DEFAULT_PORT,
     bind: Bind = LOOPBACK,
 ) -> None:
     """Play a recorded run over Zenoh: estimates, truth, pictures, nodes that come and go."""
+    if rerun:
+        _open_in_rerun(run)
+        return
     # Zenoh and the formats of recordings take their time to import.
-    from sim.recording.opening import open_recording
-    from sim.recording.playback import Playback
-    from sim.recording.replay import Replay
+    from sim.replay.opening import open_recording
+    from sim.replay.playback import Playback
+    from sim.replay.player import Replay
 
     with closing(open_recording(run)) as recording, ExitStack() as stack:
         scenario = recording.scenario
@@ -49,3 +57,12 @@ def replay(
             audience = server.wait_for_audience
         bar = stack.enter_context(progress_bar(f"{scenario.name}: frames", recording.frames))
         player.run(threading.Event(), bar, audience)
+
+
+def _open_in_rerun(run: Path) -> None:
+    if find_spec("rerun") is None:
+        raise RecordingError("Rerun is not installed: pip install 'dcpf[rerun]'")
+    from sim.recording.rerun_viewer import view
+    from sim.replay.opening import film_of
+
+    view(film_of(run))

@@ -8,7 +8,7 @@ from collections import Counter
 
 import pytest
 
-from sim.recording.opening import open_recording
+from sim.replay.opening import open_recording
 from sim.running.recorder import FILM
 
 pytestmark = [

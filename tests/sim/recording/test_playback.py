@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.recording.playback import Playback
+from sim.replay.playback import Playback
 
 steps = st.lists(
     st.tuples(st.sampled_from(["play", "pause", "wait", "slow", "fast"]), st.integers(0, 40)), max_size=15

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from network import codec
 from network.messages import PreviewMessage
-from sim.recording.folder import FolderRecording
-from sim.recording.opening import open_recording
 from sim.recording.reader import McapRecording
+from sim.replay.folder import FolderRecording
+from sim.replay.opening import open_recording
 from sim.running.recorder import FILM, RecordingError
 
 

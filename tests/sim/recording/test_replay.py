@@ -8,9 +8,9 @@ import pytest
 
 from network import keys, sessions
 from network.errors import NetworkError
-from sim.recording.opening import open_recording
-from sim.recording.playback import Playback
-from sim.recording.replay import Replay
+from sim.replay.opening import open_recording
+from sim.replay.playback import Playback
+from sim.replay.player import Replay
 
 pytestmark = pytest.mark.processes
 

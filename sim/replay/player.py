@@ -13,7 +13,7 @@ import zenoh
 from network import keys, sessions
 from network.messages import PreviewMessage
 from network.zenoh import has_listeners, publish_again
-from sim.recording.playback import Playback
+from sim.replay.playback import Playback
 from sim.running.recorder import expected_tracks
 from sim.scenario.model import Scenario
 

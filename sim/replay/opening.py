@@ -2,9 +2,21 @@
 
 from pathlib import Path
 
-from sim.recording.folder import FolderRecording
 from sim.recording.reader import McapRecording
+from sim.replay.folder import FolderRecording
 from sim.running.recorder import FILM, RecordingError
+
+
+def film_of(path: Path) -> Path:
+    """The recording with pictures of a run.
+
+    Raises:
+        RecordingError: There is none.
+    """
+    film = path / FILM if path.is_dir() else path
+    if not film.is_file():
+        raise RecordingError(f"{path}: was recorded without pictures: run it again with --record")
+    return film
 
 
 def open_recording(path: Path) -> McapRecording | FolderRecording:
