@@ -46,7 +46,7 @@ class Story:
     def so_far(self) -> list[Event]:
         """Everything that somebody who comes now has to be told."""
         errors = [
-            {"estimator": estimator, "node": node, "errors_m": sorted(found.items())}
+            {"estimator": estimator, "node": node, "errors": sorted(found.items())}
             for (estimator, node), found in sorted(self._errors.items())
         ]
         path = [[frame, *_rounded(place[:2])] for frame, place in sorted(self._truth.items())]
@@ -80,7 +80,10 @@ class Story:
         camera = self._assembly.cameras.get(message.node)
         if camera is None or message.particles.shape[1] != self._target.n_axes:
             return None
-        pixels, _ = camera.project(in_world(message.particles, self._target))
+        if self._target.space == "image":
+            pixels = message.particles
+        else:
+            pixels, _ = camera.project(in_world(message.particles, self._target))
         shown = pixels[camera.contains(pixels)]
         return {
             "type": "preview",
@@ -101,8 +104,8 @@ class Story:
             "estimator": message.estimator,
             "node": message.node,
             "frame": message.frame,
-            "position_m": _rounded(position),
-            "ellipse_m": [_rounded(p) for p in ellipse(message.mean[:2], message.covariance[:2, :2])[::2]],
+            "position": _rounded(position),
+            "ellipse": [_rounded(p) for p in ellipse(message.mean[:2], message.covariance[:2, :2])[::2]],
             "lost": message.lost,
             "boxes_px": self._boxes(position, seen_by[message.estimator]),
         }
@@ -117,7 +120,7 @@ class Story:
         event = {
             "type": "truth",
             "frame": message.frame,
-            "position_m": _rounded(position),
+            "position": _rounded(position),
             "boxes_px": self._boxes(position, self._assembly.cameras),
         }
         self._latest["truth"] = event
@@ -133,7 +136,7 @@ class Story:
                 self._errors.setdefault(track, {})[frame] = error
                 estimator, node = track
                 events.append(
-                    {"type": "error", "estimator": estimator, "node": node, "frame": frame, "error_m": error}
+                    {"type": "error", "estimator": estimator, "node": node, "frame": frame, "error": error}
                 )
         return events
 

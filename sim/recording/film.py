@@ -27,7 +27,7 @@ from network import codec, keys
 from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from nodes.filtering.target import project_boxes
 from sim.assembly import Assembly
-from sim.pictures.theme import COLORS, PAPER
+from sim.pictures.theme import COLORS, PAPER, PARTICLE
 from sim.recording import foxglove, scene
 from sim.recording.schemas import ALIVE_SCHEMA, json_schema
 
@@ -64,16 +64,22 @@ class McapFilm:
             self._abandon()
             raise
 
+    @property
+    def _on_ground(self) -> bool:
+        """Whether positions are places in the world, not in the picture of one camera."""
+        return self.assembly.scenario.target.space != "image"
+
     def _show_setting(self) -> None:
         """What stays the same: the scenario, the cameras, the graph."""
         attached = self.assembly.scenario.model_dump_json().encode()
         self._writer.add_attachment(0, 0, SCENARIO, "application/json", attached)
+        if not self._on_ground:
+            return
         cameras = list(self.assembly.cameras.values())
         self._show("/tf", foxglove.transforms(cameras, 0.0), 0.0)
         for camera in cameras:
             self._show(f"/{camera.name}/calibration", foxglove.calibration(camera, 0.0), 0.0)
         self._show("/scene", scene.setting(self.assembly), 0.0)
-        self._file.flush()
 
     def add(self, message: Filmed) -> None:
         """Records what a node, or the world, has told; nothing of frames that the run does not have.
@@ -107,7 +113,7 @@ class McapFilm:
             if key not in self._channels:
                 self._open(key, ALIVE_SCHEMA)
             self._put(key, json.dumps({"alive": not gone}).encode(), self._now_s)
-        if gone:
+        if gone and self._on_ground:
             ids = [f"{estimator}/{node}" for estimator in ("dcpf", "cpf", "single")]
             self._show("/scene", scene.without(ids, self._now_s), self._now_s)
         words = " ".join([f"{node}: {event}", *(f"{name}={value}" for name, value in details.items())])
@@ -137,13 +143,15 @@ class McapFilm:
         target = self.assembly.scenario.target
         if len(message.mean) != 2 * target.n_axes:
             return
-        self._show("/scene", scene.estimate(message, target), time_s)
+        if self._on_ground:
+            self._show("/scene", scene.estimate(message, target), time_s)
         cameras = {"dcpf": [message.node], "cpf": list(self.assembly.cameras), "single": []}
         for name in cameras[message.estimator]:
             self._show_box(name, message.estimator, message, COLORS[message.estimator], time_s)
 
     def _show_truth(self, message: TruthMessage, time_s: float) -> None:
-        self._show("/scene", scene.truth(message, self.assembly.scenario.target), time_s)
+        if self._on_ground:
+            self._show("/scene", scene.truth(message, self.assembly.scenario.target), time_s)
         for name in self.assembly.cameras:
             self._show_box(name, "truth", message, PAPER, time_s)
 
@@ -160,9 +168,14 @@ class McapFilm:
         # the picture as it was sent, comment and all
         picture = foxglove.image(message.node, codec.encode_preview(message), time_s)
         self._show(f"/{message.node}/image", picture, time_s)
-        if message.particles.shape[1] == target.n_axes:
+        if message.particles.shape[1] != target.n_axes:
+            return
+        topic = f"/{message.node}/particles"
+        if self._on_ground:
             points = scene.in_world(message.particles, target)
-            self._show(f"/{message.node}/particles", foxglove.point_cloud(points, time_s), time_s)
+            self._show(topic, foxglove.point_cloud(points, time_s), time_s)
+        else:
+            self._show(topic, foxglove.points_annotation(message.particles, PARTICLE, time_s), time_s)
 
     def _show(self, topic: str, message: Any, time_s: float) -> None:
         """Writes a protobuf message for viewers."""

@@ -129,6 +129,19 @@ def box_annotation(box: Float[np.ndarray, " 4"], shade: str, time_s: float) -> I
     return annotations
 
 
+def points_annotation(points: Float[np.ndarray, "N 2"], shade: str, time_s: float) -> ImageAnnotations:
+    """Points in a picture, pixels, centres at whole numbers."""
+    dots = PointsAnnotation(
+        timestamp=timestamp(time_s),
+        type=PointsAnnotation.POINTS,
+        points=[Point2(x=x, y=y) for x, y in points.tolist()],
+        outline_color=color(shade),
+        fill_color=color(shade),
+        thickness=_LINE_PX,
+    )
+    return ImageAnnotations(points=[dots])
+
+
 def log(node: str, words: str, time_s: float, *, warning: bool) -> Log:
     """A line of the log."""
     level = Log.WARNING if warning else Log.INFO

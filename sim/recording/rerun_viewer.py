@@ -49,9 +49,9 @@ def show(path: Path, stream: rr.RecordingStream) -> None:
             if isinstance(message, SceneUpdate):
                 _log_scene(message, stream)
             else:
-                _, camera, _, whose = topic.split("/")
+                _, camera, *_, whose = topic.split("/")
                 cameras.append(camera)
-                _log_box(camera, whose, message, stream)
+                _log_annotation(camera, whose, message, stream)
     stream.send_blueprint(_layout(sorted(set(cameras))))
 
 
@@ -101,18 +101,24 @@ def _log_lines(entity: SceneEntity, stream: rr.RecordingStream) -> None:
         )
 
 
-def _log_box(camera: str, whose: str, annotations: ImageAnnotations, stream: rr.RecordingStream) -> None:
+def _log_annotation(
+    camera: str, whose: str, annotations: ImageAnnotations, stream: rr.RecordingStream
+) -> None:
     entity = f"{camera}/image/{whose}"
     if not annotations.points:
         stream.log(entity, rr.Clear(recursive=False))
         return
     (outline,) = annotations.points
     corners = np.array([[point.x, point.y] for point in outline.points])
-    low, high = corners.min(axis=0), corners.max(axis=0)
     color = _rgb(outline.outline_color)
-    box = rr.Boxes2D(array=[*low, *high], array_format=rr.Box2DFormat.XYXY, colors=[color])
+    drawn: Any
+    if outline.type == outline.POINTS:
+        drawn = rr.Points2D(corners, colors=[color], radii=rr.Radius.ui_points(outline.thickness))
+    else:
+        edges = [*corners.min(axis=0), *corners.max(axis=0)]
+        drawn = rr.Boxes2D(array=edges, array_format=rr.Box2DFormat.XYXY, colors=[color])
     # the frame in which Rerun's importer puts a camera's pictures
-    stream.log(entity, box, rr.CoordinateFrame(f"{camera}_image_plane"))
+    stream.log(entity, drawn, rr.CoordinateFrame(f"{camera}_image_plane"))
 
 
 def _layout(cameras: list[str]) -> rrb.Blueprint:

@@ -20,15 +20,16 @@ export class Cameras {
     if (!image || order <= view.got) return image?.close();
     view.got = order;
     view.image?.close();
-    Object.assign(view, { image, event, fresh: true });
+    Object.assign(view, { image, event });
     this.shown.push(performance.now());
     view.figure.dataset.pictures = order;
   }
 
   draw() {
     for (const view of this.views.values()) {
-      view.figure.classList.toggle("lost", this.story.nodes.get(view.name)?.state === "lost");
-      if (view.image) view.draw(this.story);
+      const lost = this.story.nodes.get(view.name)?.state === "lost";
+      view.figure.classList.toggle("lost", lost);
+      if (view.image && !(lost && view.drawn)) view.draw(this.story); // the last picture of a lost camera stays
     }
   }
 
@@ -42,7 +43,7 @@ export class Cameras {
 
 class View {
   constructor({ name, width_px, height_px }) {
-    Object.assign(this, { name, asked: 0, got: 0, image: null, event: null });
+    Object.assign(this, { name, asked: 0, got: 0, image: null, event: null, drawn: false });
     this.figure = document.createElement("figure");
     this.canvas = document.createElement("canvas");
     Object.assign(this.canvas, { width: width_px, height: height_px, id: `camera-${name}` });
@@ -61,15 +62,16 @@ class View {
     const line = Math.max(1.5, this.canvas.width * LINE_SHARE);
     context.drawImage(this.image, 0, 0, this.canvas.width, this.canvas.height);
     const frame = this.event.frame;
-    this.box(context, boxOf(story, "truth", frame, this.name), "#000000", line, [2 * line, 2 * line]);
+    this.box(context, boxOf(story, "truth", frame, this.name), colors.truth, line, [2 * line, 2 * line]);
     this.box(context, central && boxOf(story, `cpf/${central}`, frame, this.name), colors.cpf, line, []);
     const seen = this.box(context, boxOf(story, `dcpf/${this.name}`, frame, this.name), colors.dcpf, line, []);
-    this.particles(context, line);
+    this.particles(context, line, colors.particles);
+    this.drawn = true;
     this.words.textContent = seen ? `frame ${frame}` : `frame ${frame}, ${labels.dcpf} not in view`;
   }
 
-  particles(context, line) {
-    context.fillStyle = getComputedStyle(this.canvas).getPropertyValue("--particle");
+  particles(context, line, color) {
+    context.fillStyle = color;
     context.globalAlpha = 0.75;
     for (const [x, y] of this.event.particles) {
       context.beginPath();
@@ -93,9 +95,8 @@ class View {
   }
 }
 
-// Of the picture's frame if it is known, or else the latest.
+// Of the picture's frame if it is known, or else the last before it.
 function boxOf(story, track, frame, camera) {
-  const kept = story.boxes.get(track);
-  if (!kept) return null;
-  return (kept.get(frame) ?? [...kept.values()].at(-1))[camera];
+  const before = [...(story.boxes.get(track) ?? [])].filter(([at]) => at <= frame);
+  return before.length ? before.reduce((a, b) => (b[0] > a[0] ? b : a))[1][camera] : null;
 }

@@ -58,7 +58,7 @@ export class ErrorChart {
     for (let time = 0; time <= seconds + 1e-9; time += along) {
       this.write(time.toFixed(digits(along)), this.x(time * setting.rate_hz), this.height - BOTTOM + 15, "center");
     }
-    this.write("error / m", 4, 13, "left");
+    this.write(`error / ${setting.unit}`, 4, 13, "left");
     this.write("time / s", this.width - RIGHT, this.height - 5, "right");
   }
 

@@ -14,7 +14,7 @@ const story = {
   frame: 0,
   estimates: new Map(), // "dcpf/C1" -> the latest
   boxes: new Map(), // "dcpf/C1" -> frame -> boxes of the last frames
-  errors: new Map(), // "dcpf/C1" -> frame -> metres
+  errors: new Map(), // "dcpf/C1" -> frame -> metres, or pixels in the image plane
   truth: null,
   path: [], // frame -> [x, y]
   nodes: new Map(),
@@ -32,14 +32,17 @@ function begin(setting) {
   document.body.dataset.run = setting.run;
   cameras = new Cameras(byId("cameras"), story);
   playback = new Playback(byId("playback"), setting, send);
-  parts = [cameras, new GroundMap(byId("map"), story), new ErrorChart(byId("errors"), story), new NodeTable(byId("nodes"), story)];
+  parts = [cameras, new ErrorChart(byId("errors"), story), new NodeTable(byId("nodes"), story)];
+  if (setting.ground) parts.push(new GroundMap(byId("map"), story));
+  byId("map").parentElement.hidden = byId("map-note").hidden = !setting.ground;
+  for (const place of document.querySelectorAll(".unit")) place.textContent = setting.unit;
   legend(setting);
 }
 
 function legend(setting) {
   const kinds = ["dcpf", setting.central && "cpf", setting.single && "single"].filter(Boolean);
   const items = kinds.map((kind) => [setting.colors[kind], setting.labels[kind]]);
-  items.push(["var(--ink)", setting.labels.truth], ["var(--particle)", "particles"]);
+  items.push(["var(--ink)", setting.labels.truth], [setting.colors.particles, "particles"]);
   byId("legend").replaceChildren(...items.map(([color, words]) => {
     const item = document.createElement("li");
     const dot = document.createElement("i");
@@ -52,7 +55,7 @@ function legend(setting) {
 const tellers = {
   setting: begin,
   history(event) {
-    for (const { estimator, node, errors_m } of event.errors) story.errors.set(`${estimator}/${node}`, new Map(errors_m));
+    for (const { estimator, node, errors } of event.errors) story.errors.set(`${estimator}/${node}`, new Map(errors));
     for (const [frame, x, y] of event.truth) story.path[frame] = [x, y];
   },
   estimate(event) {
@@ -63,13 +66,13 @@ const tellers = {
   },
   truth(event) {
     story.truth = event;
-    story.path[event.frame] = event.position_m.slice(0, 2);
+    story.path[event.frame] = event.position.slice(0, 2);
     keepBoxes("truth", event);
   },
   error(event) {
     const track = `${event.estimator}/${event.node}`;
     if (!story.errors.has(track)) story.errors.set(track, new Map());
-    story.errors.get(track).set(event.frame, event.error_m);
+    story.errors.get(track).set(event.frame, event.error);
   },
   node(event) { story.nodes.set(event.node, event); },
   playback(event) { playback.show(event); },

@@ -10,15 +10,15 @@ export class GroundMap {
     const { setting } = this.story;
     const drawing = sharp(this.canvas);
     Object.assign(this, drawing);
-    const { low, high } = setting.area_m;
+    const { low, high } = setting.ground.area_m;
     this.scale = Math.min(this.width / (high[0] - low[0]), this.height / (high[1] - low[1]));
     this.middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
-    this.views(setting);
-    this.graph(setting);
+    this.views(setting.ground);
+    this.graph(setting.ground);
     this.truthPath();
     this.estimates(setting);
-    for (const camera of setting.cameras) this.camera(camera);
-    this.scaleBar(setting, high[0] - low[0]);
+    for (const [name, camera] of Object.entries(setting.ground.cameras)) this.camera(name, camera);
+    this.scaleBar(setting.ground, high[0] - low[0]);
   }
 
   at([x, y]) {
@@ -38,10 +38,10 @@ export class GroundMap {
     this.context.fill();
   }
 
-  views(setting) {
+  views(ground) {
     this.context.lineWidth = 1;
-    for (const camera of setting.cameras) {
-      this.line(camera.view_m, { closed: true });
+    for (const { view_m } of Object.values(ground.cameras)) {
+      this.line(view_m, { closed: true });
       this.context.globalAlpha = 0.09;
       this.context.fillStyle = this.color("ink");
       this.context.fill();
@@ -51,20 +51,19 @@ export class GroundMap {
     }
     this.context.globalAlpha = 1;
     this.context.fillStyle = this.color("muted");
-    for (const corners of setting.occluders_m) {
+    for (const corners of ground.occluders_m) {
       this.line(corners, { closed: true });
       this.context.fill();
     }
   }
 
-  graph(setting) {
-    const place = new Map(setting.cameras.map((camera) => [camera.name, camera.position_m]));
-    for (const [a, b] of setting.edges) {
+  graph(ground) {
+    for (const [a, b] of ground.edges) {
       const broken = [a, b].some((name) => this.isLost(name));
       this.context.strokeStyle = this.color(broken ? "lost" : "muted");
       this.context.lineWidth = 1.5;
       this.context.setLineDash(broken ? [2, 6] : [6, 3]);
-      this.line([place.get(a), place.get(b)]);
+      this.line([ground.cameras[a].position_m, ground.cameras[b].position_m]);
       this.context.stroke();
     }
     this.context.setLineDash([]);
@@ -86,21 +85,21 @@ export class GroundMap {
     const order = ["single", "cpf", "dcpf"];
     const all = [...this.story.estimates.values()].filter(({ node }) => !this.isLost(node));
     all.sort((a, b) => order.indexOf(a.estimator) - order.indexOf(b.estimator));
-    for (const { estimator, position_m, ellipse_m } of all) {
+    for (const { estimator, position, ellipse } of all) {
       const color = colors[estimator];
       if (estimator !== "single") {
         this.context.strokeStyle = color;
         this.context.lineWidth = 1.25;
-        this.line(ellipse_m, { closed: true });
+        this.line(ellipse, { closed: true });
         this.context.stroke();
       }
-      this.dot(position_m, { single: 3, cpf: 6, dcpf: 4 }[estimator], color);
+      this.dot(position, { single: 3, cpf: 6, dcpf: 4 }[estimator], color);
     }
-    if (this.story.truth) this.dot(this.story.truth.position_m, 2, this.color("ink"));
+    if (this.story.truth) this.dot(this.story.truth.position, 2, this.color("ink"));
   }
 
   // A triangle that opens in the direction of sight, and the name behind it.
-  camera({ name, position_m, heading }) {
+  camera(name, { position_m, heading }) {
     const [x, y] = this.at(position_m);
     const [dx, dy] = [heading[0], -heading[1]];
     const color = this.color(this.isLost(name) ? "lost" : "ink");
@@ -119,11 +118,11 @@ export class GroundMap {
   }
 
   // In the lower corner that is farther from all cameras.
-  scaleBar(setting, extent) {
+  scaleBar(ground, extent) {
     const length = roundStep(extent, 5);
     const bottom = this.height - 12;
     const corners = [12, this.width - 12 - length * this.scale];
-    const room = (left) => Math.min(...setting.cameras.map(({ position_m }) => {
+    const room = (left) => Math.min(...Object.values(ground.cameras).map(({ position_m }) => {
       const [x, y] = this.at(position_m);
       return Math.hypot(x - left - 0.5 * length * this.scale, y - bottom);
     }));

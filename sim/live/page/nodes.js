@@ -1,5 +1,5 @@
 // A row for every node: how it is, how well it knows, what it sends.
-import { metres, rate } from "./format.js";
+import { length, rate } from "./format.js";
 
 const WORDS = { waiting: "○ waiting", alive: "● running", lost: "✕ lost", done: "✓ done", failed: "✕ left" };
 
@@ -24,8 +24,8 @@ export class NodeTable {
     badge.className = `chip ${state}`;
     const when = returned ? `, back at ${since}` : state === "lost" ? ` at ${since}` : "";
     set(badge, WORDS[state] + when);
-    set(error, metres(this.latest(node === central ? `cpf/${node}` : `dcpf/${node}`)) + (node === central ? " (CPF)" : ""));
-    set(alone, metres(this.latest(`single/${node}`)));
+    set(error, length(this.latest(node === central ? `cpf/${node}` : `dcpf/${node}`)) + (node === central ? " (CPF)" : ""));
+    set(alone, length(this.latest(`single/${node}`)));
     set(consensus, rate(bytes_per_s.consensus));
     set(pixels, rate(bytes_per_s.pixels));
   }

@@ -1,6 +1,7 @@
 """What the page is told, without page and network: errors, boxes, particles, nodes that come and go."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from sim.live.story import Story
 from sim.running.in_process import run_in_process
 from sim.running.results import Results
 from sim.scenario.loading import load_scenario
+
+WICA = Path(__file__).parents[3] / "scenarios" / "wica.yaml"
 
 
 @pytest.fixture
@@ -41,11 +44,11 @@ def test_errors_are_those_of_the_results_whatever_comes_first(assembly):
         for event in errors:
             if event["frame"] > 0:
                 expected = results.errors((event["estimator"], event["node"]))[event["frame"] - 1]
-                assert event["error_m"] == pytest.approx(expected, abs=1e-4)
+                assert event["error"] == pytest.approx(expected, abs=1e-4)
         # who comes later is told the same
         (history,) = of_kind(story.so_far(), "history")
-        later = {(e["estimator"], e["node"], f, v) for e in history["errors"] for f, v in e["errors_m"]}
-        assert later == {(e["estimator"], e["node"], e["frame"], e["error_m"]) for e in errors}
+        later = {(e["estimator"], e["node"], f, v) for e in history["errors"] for f, v in e["errors"]}
+        assert later == {(e["estimator"], e["node"], e["frame"], e["error"]) for e in errors}
         assert len(history["truth"]) == 6
         json.dumps(story.so_far(), allow_nan=False)
 
@@ -60,7 +63,7 @@ def test_boxes_are_in_the_pictures_of_those_that_they_concern(assembly):
         for name, box in event["boxes_px"].items():
             projected = project_boxes(message.mean[None, :2], target, assembly.cameras[name])[0]
             np.testing.assert_allclose(box, projected, atol=0.051)
-        rim = np.array(event["ellipse_m"]) - message.mean[:2]
+        rim = np.array(event["ellipse"]) - message.mean[:2]
         far = np.einsum("ij,jk,ik->i", rim, np.linalg.inv(message.covariance[:2, :2]), rim)
         np.testing.assert_allclose(far, 4, rtol=0.2)  # to the millimetre
 
@@ -125,8 +128,23 @@ def test_the_setting_is_plain_and_holds_everybody(small, overrides):
     told = setting(Assembly(load_scenario(small, overrides)), recorded=True)
     json.dumps(told, allow_nan=False)
     assert [camera["name"] for camera in told["cameras"]] == ["A", "B", "C", "D"]
-    low, high = np.array(told["area_m"]["low"]), np.array(told["area_m"]["high"])
-    for camera in told["cameras"]:
+    area = told["ground"]["area_m"]
+    low, high = np.array(area["low"]), np.array(area["high"])
+    for camera in told["ground"]["cameras"].values():
         assert (low < camera["position_m"]).all()
         assert (camera["position_m"] < high).all()
-    assert len(told["edges"]) == 4
+    assert len(told["ground"]["edges"]) == 4
+
+
+def test_in_the_image_plane_there_are_pixels_and_no_ground():
+    assembly = Assembly(load_scenario(WICA, [("frames", "2"), ("filter.n_particles", "50")]))
+    story = Story(assembly, recorded=False)
+    assert story.so_far()[0]["unit"] == "px"
+    assert "ground" not in story.so_far()[0]
+    for message in run_in_process(assembly, watched=True):
+        if isinstance(message, PreviewMessage):
+            shown = np.array(story.picture(message)["particles"])
+            np.testing.assert_allclose(shown, message.particles, atol=0.051)
+        else:
+            events = story.take(message, 0.0)
+            json.dumps(events, allow_nan=False)

@@ -2,6 +2,8 @@
 
 import json
 from collections import defaultdict
+from functools import partial
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -12,8 +14,14 @@ from scipy.spatial.transform import Rotation
 
 from network.messages import EstimateMessage, PreviewMessage
 from nodes.filtering.target import project_boxes
+from sim.assembly import Assembly
 from sim.recording import foxglove
+from sim.recording.film import McapFilm
+from sim.running.in_process import run_in_process
 from sim.running.recorder import Recorder, RecordingError
+from sim.scenario.loading import load_scenario
+
+WICA = Path(__file__).parents[3] / "scenarios" / "wica.yaml"
 
 SCHEMAS = {
     "/tf": "foxglove.FrameTransforms",
@@ -168,6 +176,23 @@ def test_targets_in_a_volume_are_recorded_at_their_height(recorded):
     np.testing.assert_allclose(balls, means)
 
 
+def test_a_camera_that_tracks_in_its_image_plane_has_no_place_in_the_world(tmp_path):
+    assembly = Assembly(load_scenario(WICA, [("frames", "3"), ("filter.n_particles", "50")]))
+    with Recorder(tmp_path / "wica", assembly.scenario, partial(McapFilm, assembly=assembly)) as recorder:
+        told = list(run_in_process(assembly, watched=True))
+        for message in told:
+            recorder.add(message)
+        recorder.event("lost", "C1", frame=2)
+    found, schemas = read(tmp_path / "wica" / "run.mcap")
+    assert not {"/scene", "/tf", "/C1/calibration"} & schemas.keys()
+    assert schemas["/C1/particles"] == "foxglove.ImageAnnotations"
+    previews = [each for each in told if isinstance(each, PreviewMessage)]
+    for preview, (_, annotations) in zip(previews, found["/C1/particles"], strict=True):
+        (dots,) = annotations.points
+        np.testing.assert_allclose([[p.x, p.y] for p in dots.points], preview.particles)
+    assert len(found["/C1/boxes/dcpf"]) == 3
+
+
 def test_a_film_of_an_earlier_run_does_not_stay(recorded):
     run = recorded()
     assert run.film.exists()
@@ -177,8 +202,6 @@ def test_a_film_of_an_earlier_run_does_not_stay(recorded):
 
 
 def test_a_full_disk_is_a_sentence(recorded, tmp_path):
-    from sim.recording.film import McapFilm
-
     run = recorded(("frames", "2"))
 
     def onto_a_full_disk(path):

@@ -1,0 +1,175 @@
+"""The compiled kernel's interface: pictures, references and boxes as C sees them (`count.c`)."""
+
+import ctypes
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8, UInt16
+
+from nodes.counting.build import load_kernel
+from nodes.counting.codebook import Codebook
+from nodes.counting.grid import rows_of_parts, sample_positions
+
+_int32, _pointer = ctypes.c_int32, ctypes.c_void_p
+_ROOTS = np.sqrt(np.arange(16384.0))
+
+
+class _Picture(ctypes.Structure):
+    _fields_ = (
+        ("pixels", _pointer),
+        ("stride", ctypes.c_int64),
+        ("height", _int32),
+        ("width", _int32),
+        ("index", _pointer),
+        ("hue_bins", _int32),
+        ("grey_chroma", _int32),
+        ("grey_saturation", _int32),
+    )
+
+
+class _Reference(ctypes.Structure):
+    _fields_ = (
+        ("parts", _int32),
+        ("codes", _int32),
+        ("joints", _int32),
+        ("channels", _int32),
+        ("first", _pointer),
+        ("edges", _pointer),
+        ("table", _pointer),
+        ("scale", _pointer),
+        ("roots", _pointer),
+        ("known_roots", _int32),
+    )
+
+
+class _Sampling(ctypes.Structure):
+    _fields_ = (
+        ("columns", _int32),
+        ("rows", _int32),
+        ("x", _pointer),
+        ("y", _pointer),
+        ("part", _pointer),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Coding:
+    """How a pixel gets its joint index.
+
+    Attributes:
+        tables: What blue, green and red add to it.
+        hue_bins: If above 0, the index is the bin of the hue instead.
+        grey_chroma, grey_saturation: Which pixels have no hue; see `nodes.filtering.hue.hue_bins`.
+    """
+
+    tables: UInt16[np.ndarray, "3 256"]
+    hue_bins: int = 0
+    grey_chroma: int = 0
+    grey_saturation: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Compiled:
+    """A reference as C sees it.
+
+    Attributes:
+        book: The colours that are told apart.
+        structure: The codes of each joint index, and what the root of a count is worth.
+        kept: The arrays that the structure points to.
+    """
+
+    book: Codebook
+    structure: _Reference
+    kept: tuple[np.ndarray, ...]
+
+
+def compile_reference(book: Codebook, scale: Float[np.ndarray, " K"]) -> Compiled:
+    """Makes a reference ready: joint indices are its bins, or all combinations of bins of three channels.
+
+    Args:
+        book: The colours that are told apart.
+        scale: What the root of each code's count is worth.
+    """
+    codes, edges, scale = _joint_codes(book), book.part_edges, np.ascontiguousarray(scale)
+    n_parts, n_joints, n_channels = codes.shape
+    first = np.searchsorted(book.part, np.arange(n_parts + 1)).astype(np.int32)
+    structure = _Reference(
+        *(n_parts, len(book.part), n_joints, n_channels),
+        *(array.ctypes.data for array in (first, edges, codes, scale, _ROOTS)),
+        len(_ROOTS),
+    )
+    return Compiled(book, structure, (first, edges, codes, scale))
+
+
+@lru_cache(maxsize=64)
+def _joint_codes(book: Codebook) -> UInt16[np.ndarray, "P J C"]:
+    """The codes of each joint index in each part and channel; K where the colour is not told apart."""
+    n_channels, n_bins = book.codes.shape[1:]
+    joint = np.arange(n_bins**n_channels)
+    # red, green, blue are the digits of the joint index, red the first
+    digits = [joint // n_bins ** (n_channels - 1 - channel) % n_bins for channel in range(n_channels)]
+    codes = np.stack([book.codes[:, channel, digit] for channel, digit in enumerate(digits)], axis=2)
+    return np.ascontiguousarray(codes, dtype=np.uint16)
+
+
+@lru_cache
+def _samples(
+    grid: tuple[int, int] | None, kernel: str, part_heights: tuple[float, ...]
+) -> tuple[_Sampling, object]:
+    if grid is None:
+        return _Sampling(0, 0, None, None, None), None
+    x, y = sample_positions(grid[0], kernel, 1.0), sample_positions(grid[1], kernel, 0.5)
+    part = np.empty(grid[1], np.int32)
+    for number, rows in enumerate(rows_of_parts(grid[1], kernel, part_heights)):
+        part[rows] = number
+    x, y = np.ascontiguousarray(x), np.ascontiguousarray(y)
+    return _Sampling(grid[0], grid[1], x.ctypes.data, y.ctypes.data, part.ctypes.data), (x, y, part)
+
+
+def count_compiled(
+    image: UInt8[np.ndarray, "H W 3"],
+    coding: Coding,
+    boxes: Float[np.ndarray, "N 4"],
+    reference: Compiled,
+    grid: tuple[int, int] | None,
+    kernel: str,
+) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, "N P"], Float[np.ndarray, " N"]]:
+    """Counts the colours in boxes, as `nodes.counting.histogram.count` does, and sums their roots up.
+
+    Args:
+        image: The picture, blue, green, red.
+        coding: From pixels to joint indices.
+        boxes: left, top, right, bottom in pixels; NaN where there is none.
+        reference: From joint indices to codes, and what they are worth.
+        grid: Columns and rows of the samples, or None for every pixel.
+        kernel: The density of the samples.
+
+    Returns:
+        Counts, pixels in each part, and Σ_p (Σ_k scale √count) / √pixels, the Bhattacharyya coefficient.
+
+    Raises:
+        KernelError: There is no compiled kernel.
+        MemoryError: The boxes cover more than fits into memory.
+    """
+    n, book = len(boxes), reference.book
+    if image.strides[1:] != (3, 1):
+        image = np.ascontiguousarray(image)
+    boxes = np.ascontiguousarray(boxes)
+    counts = np.zeros((n, len(book.part)), np.int32)
+    pixels, coefficients = np.zeros((n, len(book.part_heights)), np.int32), np.empty(n)
+    samples, _kept = _samples(grid, kernel, book.part_heights)
+    picture = _Picture(
+        *(image.ctypes.data, image.strides[0], *image.shape[:2]),
+        *(coding.tables.ctypes.data, coding.hue_bins, coding.grey_chroma, coding.grey_saturation),
+    )
+    failed = load_kernel().dcpf_count(
+        *(ctypes.byref(structure) for structure in (picture, reference.structure, samples)),
+        *(_pointer(boxes.ctypes.data), _int32(n)),
+        *(_pointer(array.ctypes.data) for array in (counts, pixels, coefficients)),
+    )
+    if failed:
+        raise MemoryError(
+            f"the boxes cover too much of a picture of {image.shape[1]} x {image.shape[0]} pixels"
+        )
+    return counts, pixels, coefficients
