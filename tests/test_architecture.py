@@ -22,6 +22,13 @@ PURE = (
         for name in ("camera.py", "central.py", "estimator.py", "preview.py", "setup.py", "smart_camera.py")
     ),
     *(
+        ROOT / "sim" / name
+        for name in (
+            *("live/nodes.py", "live/setting.py", "live/story.py", "replay/playback.py"),
+            *("recording/foxglove.py", "recording/scene.py", "recording/schemas.py"),
+        )
+    ),
+    *(
         ROOT / "network" / name
         for name in (
             *("codec.py", "consensus.py", "errors.py", "graph.py", "jpeg.py", "keys.py", "memory.py"),

@@ -1,6 +1,5 @@
 """`dcpf replay`: plays a recorded run through the keys that it had."""
 
-import threading
 from contextlib import ExitStack, closing
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,6 +10,7 @@ import typer
 from sim.assembly import Assembly
 from sim.commands.live import DEFAULT_PORT, LOOPBACK, Bind, Live, Port, page, say
 from sim.commands.shared import progress_bar
+from sim.replay.playback import MAX_SPEED, Playback
 from sim.running.recorder import RecordingError
 
 
@@ -19,9 +19,7 @@ def replay(
         Path,
         typer.Argument(metavar="RUN", help="Folder of a run, or a recording (.mcap).", show_default=False),
     ],
-    speed: Annotated[
-        float, typer.Option(help="How many times faster than the run's own time.", min=0.01)
-    ] = 1.0,
+    speed: Annotated[float, typer.Option(help="Times the run's own time.", min=0.01, max=MAX_SPEED)] = 1.0,
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
     listen: Annotated[
         str | None,
@@ -42,7 +40,6 @@ def replay(
         return
     # Zenoh and the formats of recordings take their time to import.
     from sim.replay.opening import open_recording
-    from sim.replay.playback import Playback
     from sim.replay.player import Replay
 
     with closing(open_recording(run)) as recording, ExitStack() as stack:
@@ -56,7 +53,7 @@ def replay(
             server = stack.enter_context(page(Assembly(scenario), endpoint, (bind, port), player.steered))
             audience = server.wait_for_audience
         bar = stack.enter_context(progress_bar(f"{scenario.name}: frames", recording.frames))
-        player.run(threading.Event(), bar, audience)
+        player.run(bar, audience)
 
 
 def _open_in_rerun(run: Path) -> None:

@@ -132,7 +132,7 @@ class LiveServer:
 
     def _obey(self, viewer: Viewer, words: str | bytes) -> None:
         """What the page asks for; anything else is left."""
-        with suppress(ValueError):
+        with suppress(ValueError, OverflowError, RecursionError):
             order = json.loads(words)
             match order:
                 case {"order": "look", "value": bool(looking)}:

@@ -10,7 +10,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
 MOST_WAITING = 20_000
-"""Events that wait for a browser before it counts as gone."""
+"""Events that wait for a browser; whoever has not taken so many is not there, as the pings will find."""
 _LENGTH = struct.Struct("<I")
 
 
@@ -31,7 +31,8 @@ class Viewer:
 
     def tell(self, text: str) -> None:
         """Events, as one JSON array, to be sent in turn."""
-        self._waiting.append(text)
+        if len(self._waiting) < MOST_WAITING:
+            self._waiting.append(text)
         self._something.set()
 
     def show(self, node: str, data: bytes) -> None:
@@ -42,7 +43,7 @@ class Viewer:
     async def serve(self) -> None:
         """Sends what waits, until the browser goes."""
         try:
-            while len(self._waiting) < MOST_WAITING:
+            while True:
                 await self._something.wait()
                 self._something.clear()
                 waiting, self._waiting = self._waiting, []

@@ -5,6 +5,9 @@ Pure: the time is an argument, seconds of any clock that does not go back.
 
 from dataclasses import dataclass, replace
 
+MAX_SPEED = 1000.0
+"""Times the run's own time: as fast as it goes, with any recording."""
+
 
 @dataclass(frozen=True, slots=True)
 class Playback:
@@ -55,10 +58,10 @@ class Playback:
         """Goes on, or will, so many times faster than the run's own time.
 
         Raises:
-            ValueError: The speed is not a positive number.
+            ValueError: The speed is not above 0, or above `MAX_SPEED`.
         """
-        if not 0 < speed < float("inf"):
-            raise ValueError(f"a speed of {speed}: it has to be above 0")
+        if not 0 < speed <= MAX_SPEED:
+            raise ValueError(f"a speed of {speed}: it has to be above 0, at most {MAX_SPEED:g}")
         return replace(self, speed=speed, anchor=self.position(now_s), anchor_s=now_s)
 
     def seek(self, frame: int, now_s: float) -> "Playback":

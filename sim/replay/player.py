@@ -76,32 +76,26 @@ class Replay:
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
         self._told, self._seen = -1, False
 
-    def run(
-        self,
-        stopped: threading.Event,
-        progress: Callable[[int], None],
-        audience: Callable[[float], bool] | None = None,
-    ) -> None:
-        """Plays until the end, or until it is stopped.
+    def run(self, progress: Callable[[int], None], audience: Callable[[float], bool] | None = None) -> None:
+        """Plays until the end.
 
         Args:
-            stopped: Set from outside to end it.
             progress: Told how many frames have been played.
             audience: Waits so many seconds for somebody who looks on, if there will be any: playing begins
                 with them, and it stays at the end, for they may turn it back.
         """
         self._show_nodes(0)
-        while audience is not None and not audience(LISTENERS_S) and not stopped.is_set():
+        while audience is not None and not audience(LISTENERS_S):
             pass
         self._wait_for_listeners(LISTENERS_S)
         self.steer(Playback.play)
-        while not stopped.wait(MOMENT_S):
-            now = time.monotonic()
-            playback = self.playback
+        ended = False
+        while audience is not None or not ended:
+            now, playback = time.monotonic(), self.playback
             self._tell(playback.frame(now))
             progress(self._told + 1)
-            if playback.ended(now) and audience is None:
-                return
+            ended = playback.ended(now)
+            time.sleep(MOMENT_S)
 
     def _wait_for_listeners(self, timeout_s: float) -> None:
         limit = time.monotonic() + timeout_s

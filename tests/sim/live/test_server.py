@@ -107,6 +107,13 @@ def test_the_run_is_passed_on_and_pictures_while_somebody_looks(serve, endpoint,
                 nodes = [e for e in events_until(browser, "node") if e["type"] == "node" and e["node"] == "A"]
                 if nodes[-1]["state"] == "lost":
                     break
+            # and its return
+            camera = ZenohTransport(
+                "small", "A", Links(), [f"unixsock-stream/{tmp_path}/b"], [endpoint], drop_late_pixels=False
+            )
+            camera.announce()
+            (back,) = [e for e in events_until(browser, "node") if e["type"] == "node"]
+            assert (back["node"], back["state"], back["returned"]) == ("A", "alive", True)
     finally:
         camera.close()
         sessions.close(router)

@@ -135,3 +135,15 @@ def test_recordings_of_other_programs_are_told_apart(tmp_path):
         writer.finish()
     with pytest.raises(RecordingError, match="is no recording of a run"):
         open_recording(tmp_path)
+
+
+def test_damage_inside_a_recording_with_an_index_is_said(recorded):
+    run = recorded()
+    whole = bytearray(run.film.read_bytes())
+    middle = len(whole) // 2
+    whole[middle : middle + 4000] = bytes(4000)
+    run.film.write_bytes(whole)
+    recording = open_recording(run.folder)
+    with pytest.raises(RecordingError, match="is damaged at frame"):
+        all_of(recording)
+    recording.close()

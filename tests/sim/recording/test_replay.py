@@ -1,7 +1,6 @@
 """Replays over Zenoh: whoever listens hears what the run told."""
 
 import socket
-import threading
 from contextlib import closing
 
 import pytest
@@ -33,7 +32,7 @@ def test_listeners_hear_the_run_again(recorded, endpoint, wait_until, pictures):
         listener.declare_subscriber("dcpf/small/**", heard.append)
         listener.liveliness().declare_subscriber(keys.alive("small"), tokens.append, history=True)
         done = []
-        player.run(threading.Event(), done.append)
+        player.run(done.append)
         assert wait_until(lambda: sum("estimate" in str(each.key_expr) for each in heard) == 54, 5.0)
         assert done[-1] == 6
         player.close()
