@@ -183,7 +183,8 @@ class PreviewMessage:
         node: The camera.
         frame: Frame of the run.
         time_s: Its time, seconds from frame 0.
-        particles: Positions of some particles of the fusion filter, all of the same weight; metres.
+        particles: Positions of some particles of the fusion filter, all of the same weight; metres, or pixels
+            of a camera that tracks in its image plane.
         jpeg: The picture, in the camera's own size.
 
     Raises:

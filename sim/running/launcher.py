@@ -99,7 +99,9 @@ class Launch:
             self._listen(session)
             self._wait_until_ready(children)
             if self._audience is not None:
+                waiting = time.monotonic()
                 self._audience()
+                self._began += time.monotonic() - waiting  # whose time it is not
             self._start(session)
             started = self._last_heard = time.monotonic()
             for message in self._messages(children):
