@@ -17,6 +17,7 @@ OUTSIDE_WORLD = {
 
 PURE = (
     *sorted((ROOT / "nodes/filtering").glob("*.py")),
+    *sorted((ROOT / "nodes/simd").rglob("*.py")),
     *(
         ROOT / "nodes" / name
         for name in ("camera.py", "central.py", "estimator.py", "setup.py", "smart_camera.py")
