@@ -253,10 +253,9 @@ class SimdTracker:
                 factor = scale_factor(array, total, group)
             with array.step(Step.MEAN):
                 mean = [weighted_mean(array, weight, word, total, group) for word in self._state[:2]]
-            with array.step(Step.NORMALIZATION):
-                with array.using(array.number()) as (share,):
-                    normalized(array, share, weight, factor, extra_words=0)
-                    array.copy(self._weight, share, when=array.less(place, group.n))
+            with array.step(Step.NORMALIZATION), array.using(array.number()) as (share,):
+                normalized(array, share, weight, factor, extra_words=0)
+                array.copy(self._weight, share, when=array.less(place, group.n))
             with array.step(Step.RESAMPLING):
                 replication_bounds(array, (start, end), weight, factor, place, group, self._rng)
                 replicate(array, self._state, (start, end), place, group)

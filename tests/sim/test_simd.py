@@ -63,7 +63,7 @@ def test_a_small_line_memory_says_what_uses_it():
 
 def test_the_bars_add_up_to_the_arrays_work():
     pipeline = Pipeline(240, 13.0, 225, 2.5, 240, 6, 5.5 * LINE_INTERVAL_US)
-    time, traffic = plot_line_intervals(pipeline, 256, 480).axes
+    time, traffic = plot_line_intervals(pipeline, 256.0, 480).axes
     busy = sum(bar.get_height() for bar in time.patches)
     assert busy == pytest.approx(pipeline.busy_us)
     moved = sum(bar.get_height() for bar in traffic.patches)
