@@ -103,6 +103,21 @@ def test_distances_without_a_whole_histogram_give_the_same_track():
     )
 
 
+def test_few_particles_are_counted_side_by_side_with_the_same_track():
+    # 100 < 320 · 15 / 30 regions of 15 columns: five passes of 21
+    def run(shape):
+        tracker = SimdTracker(options(n_particles=(100,)), np.random.default_rng(9))
+        tracker._side_by_side = shape == "side by side"
+        return followed(tracker, 3), tracker.report()
+
+    errors, report = run("side by side")
+    expected, in_columns = run("columns")
+    np.testing.assert_array_equal(errors, expected)
+    assert report.costs[Step.HISTOGRAMS].external_reads == 5 * 15 * 315
+    assert report.costs[Step.HISTOGRAMS].cycles < in_columns.costs[Step.HISTOGRAMS].cycles
+    assert report.n_words <= 64
+
+
 @pytest.fixture(scope="module")
 def report():
     tracker = SimdTracker(options(), np.random.default_rng(0))
