@@ -11,10 +11,19 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from sim.commands.shared import AsJson, Frames, Overrides, progress_bar, read_scenario, split_overrides
+from sim.commands.shared import (
+    AsJson,
+    Frames,
+    Overrides,
+    length_text,
+    progress_bar,
+    read_scenario,
+    split_overrides,
+)
 from sim.running.experiment import compare as compare_runs
 from sim.running.experiment import run_many
 from sim.running.recorder import RecordingError
+from sim.running.results import length
 
 
 def compare(
@@ -80,7 +89,7 @@ def _print(report: dict[str, Any], folder: Path) -> None:
     for heading in ("DCPF", "CPF", "best single", "DCPF/CPF", "ANEES"):
         table.add_column(heading, justify="right", no_wrap=True)
     for label, each in report.items():
-        rmse = each["rmse_m"]
+        rmse, unit = length(each, "rmse"), each["unit"]
         for title, row, statistic in (
             ("median", label, "median"),
             ("worst", f"  {each['runs']} runs", "max"),
@@ -88,13 +97,14 @@ def _print(report: dict[str, Any], folder: Path) -> None:
             table.add_row(
                 row,
                 title,
-                *(_figure(rmse[name], statistic, " m", 3) for name in ("dcpf", "cpf", "best_single")),
-                _figure(each["ratio_dcpf_cpf"], statistic, "", 2),
-                _figure(each["anees"]["dcpf"], statistic, "", 2),
+                *(_length(rmse[name], statistic, unit) for name in ("dcpf", "cpf", "best_single")),
+                _figure(each["ratio_dcpf_cpf"], statistic),
+                _figure(each["anees"]["dcpf"], statistic),
             )
     console.print(table)
     for label, each in report.items():
-        lost, disagreement = each["lost_fraction"], _figure(each["disagreement_m"], "median", " m", 3)
+        lost = each["lost_fraction"]
+        disagreement = _length(length(each, "disagreement"), "median", each["unit"])
         console.print(
             f"{label}: target lost in {lost['dcpf']:.0%} of the runs by DCPF, in {lost['cpf']:.0%} by CPF;"
             f" nodes disagree by {disagreement}",
@@ -107,5 +117,9 @@ def _print(report: dict[str, Any], folder: Path) -> None:
     console.print(f"figures and plots in {folder}", soft_wrap=True)
 
 
-def _figure(values: dict[str, float] | None, statistic: str, unit: str, digits: int) -> str:
-    return "–" if values is None else f"{values[statistic]:.{digits}f}{unit}"
+def _length(values: dict[str, float] | None, statistic: str, unit: str) -> str:
+    return length_text(None if values is None else values[statistic], unit)
+
+
+def _figure(values: dict[str, float] | None, statistic: str) -> str:
+    return "–" if values is None else f"{values[statistic]:.2f}"

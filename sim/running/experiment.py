@@ -9,7 +9,7 @@ import joblib
 
 from sim.assembly import Assembly
 from sim.running.in_process import run_in_process
-from sim.running.results import Results, summarize
+from sim.running.results import Results, in_unit, length, summarize
 from sim.scenario.loading import load_scenario
 
 Override = tuple[str, str]
@@ -50,26 +50,31 @@ def compare(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
         runs: Their summaries.
 
     Returns:
-        Medians and worst values over the runs, in metres where they are lengths; None where there is no truth
-        or no such baseline.
+        Medians and worst values over the runs, lengths in metres, or in pixels in the image plane; None where
+        there is no truth or no such baseline.
     """
     best = [_best_single(run) for run in runs]
     per_run = {
-        "dcpf": [run["rmse_m"]["dcpf"] for run in runs],
-        "cpf": [run["rmse_m"]["cpf"] for run in runs],
+        "dcpf": [length(run, "rmse")["dcpf"] for run in runs],
+        "cpf": [length(run, "rmse")["cpf"] for run in runs],
         "best_single": best,
     }
     ratios = [run["ratio_dcpf_cpf"] for run in runs]
     of_best = [d / s if d is not None and s else None for d, s in zip(per_run["dcpf"], best, strict=True)]
+    unit = runs[0].get("unit", "m")
+    lengths = {
+        "rmse": {name: _spread(values) for name, values in per_run.items()},
+        "disagreement": _spread([length(run, "disagreement") for run in runs]),
+    }
     return {
         "runs": len(runs),
-        "rmse_m": {name: _spread(values) for name, values in per_run.items()},
+        "unit": unit,
+        **in_unit(lengths, unit),
         "ratio_dcpf_cpf": _spread(ratios),
         "ratio_dcpf_best_single": _spread(of_best),
         "lost_fraction": {
             name: sum(bool(run["lost"][name]) for run in runs) / len(runs) for name in ("dcpf", "cpf")
         },
-        "disagreement_m": _spread([run["disagreement_m"] for run in runs]),
         "anees": {name: _spread([run["anees"][name] for run in runs]) for name in ("dcpf", "cpf")},
         "bytes_per_frame": runs[0]["network"]["bytes_per_frame"],
         "indefinite_local_fraction": _spread([run["fusion"]["indefinite_local_fraction"] for run in runs]),
@@ -77,7 +82,7 @@ def compare(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _best_single(run: dict[str, Any]) -> float | None:
-    return min((value for value in run["rmse_m"]["single"].values() if value is not None), default=None)
+    return min((value for value in length(run, "rmse")["single"].values() if value is not None), default=None)
 
 
 def _spread(values: Sequence[float | None]) -> dict[str, float] | None:
