@@ -17,10 +17,19 @@ OUTSIDE_WORLD = {
 
 PURE = (
     *sorted((ROOT / "nodes/filtering").glob("*.py")),
+    *sorted(path for path in (ROOT / "nodes/counting").glob("*.py") if path.name != "build.py"),
     *sorted((ROOT / "network/averaging").glob("*.py")),
+    *sorted((ROOT / "nodes/simd").rglob("*.py")),
     *(
         ROOT / "nodes" / name
-        for name in ("camera.py", "central.py", "estimator.py", "setup.py", "smart_camera.py")
+        for name in (
+            "array_estimator.py",
+            "camera.py",
+            "central.py",
+            "estimator.py",
+            "setup.py",
+            "smart_camera.py",
+        )
     ),
     *(
         ROOT / "network" / name
