@@ -2,7 +2,7 @@
 
 import ctypes
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
@@ -25,6 +25,7 @@ class _Picture(ctypes.Structure):
         ("hue_bins", _int32),
         ("grey_chroma", _int32),
         ("grey_saturation", _int32),
+        ("full_saturation", _int32),
     )
 
 
@@ -38,6 +39,7 @@ class _Reference(ctypes.Structure):
         ("edges", _pointer),
         ("table", _pointer),
         ("scale", _pointer),
+        ("perfect", _pointer),
         ("roots", _pointer),
         ("known_roots", _int32),
     )
@@ -53,20 +55,25 @@ class _Sampling(ctypes.Structure):
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Coding:
     """How a pixel gets its joint index.
 
     Attributes:
         tables: What blue, green and red add to it.
         hue_bins: If above 0, the index is the bin of the hue instead.
-        grey_chroma, grey_saturation: Which pixels have no hue; see `nodes.filtering.hue.hue_bins`.
+        grey: Which pixels have no hue: the chroma and the saturation below which they have none, and full
+            saturation; see `nodes.filtering.hue.hue_bins`.
     """
 
     tables: UInt16[np.ndarray, "3 256"]
     hue_bins: int = 0
-    grey_chroma: int = 0
-    grey_saturation: int = 0
+    grey: tuple[int, int, int] = (0, 0, 0)
+
+    @cached_property
+    def address(self) -> int:
+        """Where the tables are."""
+        return int(self.tables.ctypes.data)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,22 +91,26 @@ class Compiled:
     kept: tuple[np.ndarray, ...]
 
 
-def compile_reference(book: Codebook, scale: Float[np.ndarray, " K"]) -> Compiled:
+def compile_reference(
+    book: Codebook, scale: Float[np.ndarray, " K"], perfect: Float[np.ndarray, " P"]
+) -> Compiled:
     """Makes a reference ready: joint indices are its bins, or all combinations of bins of three channels.
 
     Args:
         book: The colours that are told apart.
         scale: What the root of each code's count is worth.
+        perfect: The most that each part can contribute.
     """
-    codes, edges, scale = _joint_codes(book), book.part_edges, np.ascontiguousarray(scale)
+    codes, edges = _joint_codes(book), book.part_edges
+    scale, perfect = np.ascontiguousarray(scale), np.ascontiguousarray(perfect)
     n_parts, n_joints, n_channels = codes.shape
     first = np.searchsorted(book.part, np.arange(n_parts + 1)).astype(np.int32)
     structure = _Reference(
         *(n_parts, len(book.part), n_joints, n_channels),
-        *(array.ctypes.data for array in (first, edges, codes, scale, _ROOTS)),
+        *(array.ctypes.data for array in (first, edges, codes, scale, perfect, _ROOTS)),
         len(_ROOTS),
     )
-    return Compiled(book, structure, (first, edges, codes, scale))
+    return Compiled(book, structure, (first, edges, codes, scale, perfect))
 
 
 @lru_cache(maxsize=64)
@@ -127,15 +138,15 @@ def _samples(
     return _Sampling(grid[0], grid[1], x.ctypes.data, y.ctypes.data, part.ctypes.data), (x, y, part)
 
 
-def count_compiled(
+def distances_compiled(
     image: UInt8[np.ndarray, "H W 3"],
     coding: Coding,
     boxes: Float[np.ndarray, "N 4"],
     reference: Compiled,
     grid: tuple[int, int] | None,
     kernel: str,
-) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, "N P"], Float[np.ndarray, " N"]]:
-    """Counts the colours in boxes, as `nodes.counting.histogram.count` does, and sums their roots up.
+) -> Float[np.ndarray, " N"]:
+    """Finds d² of each box to the reference, as `nodes.filtering.pattern.squared_distances` defines it.
 
     Args:
         image: The picture, blue, green, red.
@@ -145,31 +156,55 @@ def count_compiled(
         grid: Columns and rows of the samples, or None for every pixel.
         kernel: The density of the samples.
 
-    Returns:
-        Counts, pixels in each part, and Σ_p (Σ_k scale √count) / √pixels, the Bhattacharyya coefficient.
-
     Raises:
         KernelError: There is no compiled kernel.
         MemoryError: The boxes cover more than fits into memory.
     """
+    return _run(image, coding, boxes, reference, grid, kernel)[: 8 * len(boxes)].view(float)
+
+
+def counts_compiled(
+    image: UInt8[np.ndarray, "H W 3"],
+    coding: Coding,
+    boxes: Float[np.ndarray, "N 4"],
+    reference: Compiled,
+    grid: tuple[int, int] | None,
+    kernel: str,
+) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, "N P"]]:
+    """Counts, and pixels in each part, as `nodes.counting.histogram.count` does; see `distances_compiled`."""
+    n, n_codes = len(boxes), len(reference.book.part)
+    found = _run(image, coding, boxes, reference, grid, kernel)[8 * n :].view(np.int32)
+    return found[: n * n_codes].reshape(n, n_codes), found[n * n_codes :].reshape(n, -1)
+
+
+def _run(
+    image: UInt8[np.ndarray, "H W 3"],
+    coding: Coding,
+    boxes: Float[np.ndarray, "N 4"],
+    reference: Compiled,
+    grid: tuple[int, int] | None,
+    kernel: str,
+) -> UInt8[np.ndarray, " bytes"]:
+    """Distances, counts and pixels one after the other, in one array: asking for its address takes time."""
     n, book = len(boxes), reference.book
     if image.strides[1:] != (3, 1):
         image = np.ascontiguousarray(image)
     boxes = np.ascontiguousarray(boxes)
-    counts = np.zeros((n, len(book.part)), np.int32)
-    pixels, coefficients = np.zeros((n, len(book.part_heights)), np.int32), np.empty(n)
+    at_counts, at_pixels = 8 * n, 8 * n + 4 * n * len(book.part)
+    found = np.zeros(at_pixels + 4 * n * len(book.part_heights), np.uint8)
     samples, _kept = _samples(grid, kernel, book.part_heights)
     picture = _Picture(
         *(image.ctypes.data, image.strides[0], *image.shape[:2]),
-        *(coding.tables.ctypes.data, coding.hue_bins, coding.grey_chroma, coding.grey_saturation),
+        *(coding.address, coding.hue_bins, *coding.grey),
     )
+    address = found.ctypes.data
     failed = load_kernel().dcpf_count(
-        *(ctypes.byref(structure) for structure in (picture, reference.structure, samples)),
+        *(ctypes.byref(picture), ctypes.byref(reference.structure), ctypes.byref(samples)),
         *(_pointer(boxes.ctypes.data), _int32(n)),
-        *(_pointer(array.ctypes.data) for array in (counts, pixels, coefficients)),
+        *(_pointer(address), _pointer(address + at_counts), _pointer(address + at_pixels)),
     )
     if failed:
         raise MemoryError(
             f"the boxes cover too much of a picture of {image.shape[1]} x {image.shape[0]} pixels"
         )
-    return counts, pixels, coefficients
+    return found

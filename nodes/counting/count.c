@@ -1,4 +1,4 @@
-/* Counts the reference's colours in boxes, straight from a BGR picture, and sums up the Bhattacharyya coefficient.
+/* Counts the reference's colours in boxes, straight from a BGR picture, and tells how far they are from it.
  *
  * A pixel has a joint index: from three tables, one a channel of the picture, or from its hue; and a joint index has
  * the codes that such a pixel counts for, one a histogram. Every pixel of a box is counted from an integral image
@@ -19,7 +19,7 @@ typedef struct {
     int32_t height, width;
     const uint16_t *index; /* three tables of 256: joint index = index[b] + index[256 + g] + index[512 + r], or */
     int32_t hue_bins;      /* if above 0, the bin of the hue, as nodes/filtering/color.py has it */
-    int32_t grey_chroma, grey_saturation;
+    int32_t grey_chroma, grey_saturation, full_saturation;
 } picture;
 
 typedef struct {
@@ -28,6 +28,7 @@ typedef struct {
     const double *edges;   /* (parts + 1): where the parts begin and end, 0 to 1 */
     const uint16_t *table; /* (parts, joints, channels): the codes that a pixel counts for; `codes` is none */
     const double *scale;   /* (codes): what the root of a count is worth */
+    const double *perfect; /* (parts): the most that a part can contribute */
     const double *roots;   /* (known_roots): of the whole numbers from 0 on; looking up is faster than working out */
     int32_t known_roots;
 } reference;
@@ -38,22 +39,27 @@ typedef struct {
     const int32_t *part;   /* (rows): the part of each row */
 } sampling;
 
-static int joint_index(const picture *p, const uint8_t *bgr) {
-    int b = bgr[0], g = bgr[1], r = bgr[2];
-    if (!p->hue_bins) return p->index[b] + p->index[256 + g] + p->index[512 + r];
+/* Without branches, so that a row of pixels is done several at a time. */
+static inline int hue_bin(int b, int g, int r, int bins, int grey_chroma, int grey_saturation, int full) {
     int largest = b > g ? b : g, least = b < g ? b : g;
     largest = largest > r ? largest : r;
     least = least < r ? least : r;
-    int chroma = largest - least, n = p->hue_bins - 1;
-    if (chroma < p->grey_chroma || p->grey_saturation * chroma < largest) return n;
+    int chroma = largest - least, n = bins - 1;
+    int grey = (chroma < grey_chroma) | (full * chroma < grey_saturation * largest);
     int hue = largest == r ? g - b : largest == g ? 2 * chroma + b - r : 4 * chroma + r - g;
-    return n * (hue < 0 ? hue + 6 * chroma : hue) / (6 * chroma);
+    hue += hue < 0 ? 6 * chroma : 0;
+    /* whole numbers below 2^24: the floor is exact */
+    int sector = (int)((float)(n * hue) / (float)(6 * chroma + (chroma == 0)));
+    return grey ? n : sector;
 }
 
 static void index_row(const picture *p, const uint8_t *restrict bgr, int w, uint16_t *restrict joint) {
     const uint16_t *restrict blue = p->index, *restrict green = blue + 256, *restrict red = green + 256;
-    if (p->hue_bins)
-        for (int x = 0; x < w; x++) joint[x] = joint_index(p, bgr + 3 * x);
+    const int bins = p->hue_bins, chroma = p->grey_chroma, saturation = p->grey_saturation;
+    const int full = p->full_saturation;
+    if (bins)
+        for (int x = 0; x < w; x++)
+            joint[x] = hue_bin(bgr[3 * x], bgr[3 * x + 1], bgr[3 * x + 2], bins, chroma, saturation, full);
     else
         for (int x = 0; x < w; x++) joint[x] = blue[bgr[3 * x]] + green[bgr[3 * x + 1]] + red[bgr[3 * x + 2]];
 }
@@ -182,7 +188,8 @@ static int count_part(const uint16_t *joint, int w, int top, int left, const ref
 }
 
 static void visit(const picture *p, const reference *r, int part, int x, int y, int32_t *count) {
-    int joint = joint_index(p, p->pixels + y * p->stride + 3 * x);
+    uint16_t joint;
+    index_row(p, p->pixels + y * p->stride + 3 * x, 1, &joint);
     const uint16_t *table = r->table + ((size_t)part * r->joints + joint) * r->channels;
     for (int channel = 0; channel < r->channels; channel++)
         if (table[channel] < r->codes) count[table[channel]]++;
@@ -245,26 +252,30 @@ static int count_pixels(const picture *p, const reference *r, const double *boxe
     return failed;
 }
 
-/* Counts (n, codes), pixels (n, parts), both zero before, and coefficients (n): the sum over the parts of
- * (sum over the codes of scale * root of the count) / root of the part's pixels. Returns 1 where memory lacks. */
+/* Counts (n, codes) and pixels (n, parts), both zero before, and the distance (n) of each box to the reference,
+ * 1 - (the sum over the parts of the sum of scale * root of the count, by the root of the part's pixels) by the most
+ * that the parts in the picture can contribute. Returns 1 where memory lacks. */
 int dcpf_count(const picture *p, const reference *r, const sampling *s, const double *boxes, int32_t n,
-               int32_t *counts, int32_t *pixels, double *coefficients) {
+               double *distances, int32_t *counts, int32_t *pixels) {
     if (s->rows)
         count_samples(p, r, s, boxes, n, counts, pixels);
     else if (count_pixels(p, r, boxes, n, counts, pixels))
         return 1;
     for (int i = 0; i < n; i++) {
-        coefficients[i] = 0;
+        double coefficient = 0, most = 0;
         for (int part = 0; part < r->parts; part++) {
             const int32_t *count = counts + (size_t)i * r->codes;
             int in_part = pixels[i * r->parts + part];
+            if (!in_part) continue;
             double sum = 0;
             if (in_part < r->known_roots)
                 for (int c = r->first[part]; c < r->first[part + 1]; c++) sum += r->scale[c] * r->roots[count[c]];
             else
                 for (int c = r->first[part]; c < r->first[part + 1]; c++) sum += r->scale[c] * sqrt(count[c]);
-            coefficients[i] += sum / sqrt(in_part > 0 ? in_part : 1);
+            coefficient += sum / sqrt(in_part);
+            most += r->perfect[part];
         }
+        distances[i] = most > 0 ? 1 - coefficient / most : 1;
     }
     return 0;
 }

@@ -36,7 +36,7 @@ class Pattern:
     @cached_property
     def compiled(self) -> Compiled:
         """The same for the compiled kernel."""
-        return compile_reference(self.book, self.scale)
+        return compile_reference(self.book, self.scale, self.perfect)
 
 
 @lru_cache(maxsize=64)  # of a camera's latest references; they are compared by identity

@@ -12,6 +12,7 @@ from nodes.sources import SourceError, VideoSource
 from sim.footage import FootageError, locate
 from sim.scenario.complaints import validate
 from sim.scenario.document import merge_defaults, read_document
+from sim.scenario.edges import with_edges
 from sim.scenario.model import CameraOptions, Scenario
 from sim.scenario.parsing import ScenarioError
 from sim.scenario.presets import preset_defaults
@@ -38,7 +39,8 @@ def load_scenario(path: Path, overrides: Iterable[tuple[str, str]] = ()) -> Scen
     document = merge_defaults(document, preset_defaults(document.data))
     scenario = validate(document, Scenario)
     try:
-        return _resolve(scenario, path.parent)
+        resolved = _resolve(scenario, path.parent)
+        return with_edges(resolved, cameras_of(resolved), path.parent)
     except (CalibrationError, FootageError, SourceError) as error:
         raise ScenarioError(f"{path}: {error}") from None
     except ValueError as error:

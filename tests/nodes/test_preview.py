@@ -57,7 +57,6 @@ def test_looking_changes_no_numbers(room):
             furnished.setup,
             Consensus("C1", (), MetropolisWeights(), 1),
             ("C1",),
-            with_single=False,
         )
         for frame in range(4):
             image = furnished.image("C1", frame)
