@@ -1,0 +1,66 @@
+"""Where parts are computed: in this process, in processes of this machine, or on a cluster engine."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import joblib
+from joblib.externals.loky import get_reusable_executor
+
+from sim.experiments.parts import Part, code_version
+from sim.experiments.work import compute
+from sim.scenario.parsing import ScenarioError
+
+Result = tuple[Part, dict[str, Any]]
+
+_CONNECT_S = 10
+
+
+def compute_here(parts: Sequence[Part], n_jobs: int) -> Iterator[Result]:
+    """Computes parts on this machine, and yields each when it is done.
+
+    Args:
+        parts: What to compute.
+        n_jobs: Processes to spread it over; with one, this process does it.
+    """
+    if n_jobs == 1:
+        yield from (_with_part(part, code_version()) for part in parts)
+        return
+    try:
+        parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered", batch_size=1)
+        yield from parallel(joblib.delayed(_with_part)(part, code_version()) for part in parts)
+    finally:
+        # The workers would stay for a while, in case there is more to do.
+        get_reusable_executor().shutdown(wait=True, kill_workers=True)
+
+
+def compute_on_cluster(parts: Sequence[Part], address: str) -> Iterator[Result]:
+    """Computes parts on a Dask cluster, and yields each when it is done.
+
+    Args:
+        parts: What to compute.
+        address: Of its scheduler, such as `tcp://10.0.0.1:8786`.
+
+    Raises:
+        ScenarioError: Nobody answers there, or Dask is not installed here.
+        OtherCode: The workers run another version of the program.
+    """
+    try:
+        from distributed import Client, as_completed  # noqa: PLC0415 - an extra
+    except ImportError:
+        raise ScenarioError('--cluster needs Dask: pip install "dcpf[cluster]"') from None
+    try:
+        client = Client(address, timeout=_CONNECT_S)
+    except (OSError, ValueError) as error:
+        raise ScenarioError(
+            f"--cluster {address}: no Dask scheduler answers there: start one, or name another address"
+        ) from error
+    with client:
+        futures = client.map(_with_part, parts, code=code_version(), pure=False)
+        try:
+            yield from (result for _, result in as_completed(futures, with_results=True))
+        finally:
+            client.cancel(futures)
+
+
+def _with_part(part: Part, code: str) -> Result:
+    return part, compute(part, code)

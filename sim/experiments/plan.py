@@ -1,0 +1,158 @@
+"""From an experiment to everything that has to be computed: studies, their groups of runs, the runs' parts."""
+
+import itertools
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sim.experiments.options import ExperimentOptions, StudyOptions
+from sim.experiments.parts import Kind, Part, cameras_part, central_part
+from sim.experiments.sweeps import as_text, require_key, texts
+from sim.scenario.document import read_document
+from sim.scenario.loading import load_scenario
+from sim.scenario.model import Scenario
+from sim.scenario.parsing import ScenarioError
+
+Setting = tuple[str, str]
+"""A dotted key and its value as text."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Group:
+    """The runs of one scenario with one setting, a seed each.
+
+    Attributes:
+        study: The study that it belongs to.
+        label: Scenario and preset in words, the same for all settings.
+        scenario: The scenario's name.
+        preset: Its preset.
+        settings: The swept keys and their values.
+        seeds: Of the runs.
+        parts: What each run consists of.
+        scenario_run: The resolved scenario of the first run.
+    """
+
+    study: str
+    label: str
+    scenario: str
+    preset: str
+    settings: tuple[Setting, ...]
+    seeds: tuple[int, ...]
+    parts: tuple[Mapping[Kind, Part], ...]
+    scenario_run: Scenario
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """An experiment, resolved.
+
+    Attributes:
+        options: The experiment.
+        groups: Its groups of runs, study by study.
+    """
+
+    options: ExperimentOptions
+    groups: tuple[Group, ...]
+
+    def parts(self) -> list[Part]:
+        """Every part once, those that share their pictures side by side."""
+        parts = {part.key: part for group in self.groups for run in group.parts for part in run.values()}
+        alike: dict[str, list[Part]] = {}
+        for part in parts.values():
+            alike.setdefault(part.pictures, []).append(part)
+        return list(itertools.chain.from_iterable(alike.values()))
+
+
+def make_plan(
+    options: ExperimentOptions,
+    folder: Path,
+    overrides: Sequence[Setting],
+    place: Callable[[str, str], str],
+) -> Plan:
+    """Resolves an experiment.
+
+    Args:
+        options: The experiment.
+        folder: What its scenarios' paths are relative to.
+        overrides: Keys and values set in all scenarios, over what the experiment sets.
+        place: Where a study's swept key was written, for errors.
+
+    Raises:
+        ScenarioError: A scenario, key or value is not as it must be.
+    """
+    groups: list[Group] = []
+    for name, study in options.studies.items():
+        fixed = [(key, as_text(value)) for key, value in {**options.set, **study.set}.items()]
+        labels: dict[str, Path] = {}
+        for path, preset in itertools.product(
+            study.scenarios or options.scenarios, study.presets or options.presets or (None,)
+        ):
+            file = folder / path
+            chosen = [("preset", preset)] if preset else []
+            given = [*chosen, *fixed, *overrides]
+            _check_keys(name, study, file, given, place)
+            for settings in _settings(name, study, place):
+                scenario = load_scenario(file, [*given, *_in_file(settings, file)])
+                label = f"{scenario.name} ({scenario.preset})"
+                if labels.setdefault(label, file) != file:
+                    label = f"{file} ({scenario.preset})"
+                groups.append(_group(name, study, label, scenario, settings, options.runs))
+    return Plan(options, tuple(groups))
+
+
+def _check_keys(
+    name: str, study: StudyOptions, file: Path, given: Iterable[Setting], place: Callable[[str, str], str]
+) -> None:
+    resolved = load_scenario(file, given).model_dump(mode="json")
+    for key in study.sweep:
+        require_key(key, resolved, place(name, key))
+
+
+def _settings(
+    name: str, study: StudyOptions, place: Callable[[str, str], str]
+) -> Iterator[tuple[Setting, ...]]:
+    """Every combination of the values of a study's keys."""
+    axes = [
+        [(key, value) for value in texts(values, place(name, key))] for key, values in study.sweep.items()
+    ]
+    return itertools.product(*axes)
+
+
+def _in_file(settings: Iterable[Setting], file: Path) -> Iterator[Setting]:
+    """The settings as the scenario file would have them: so many cameras are the first so many."""
+    for key, value in settings:
+        if key == "cameras" and value.isdecimal():
+            cameras = read_document(file).data["cameras"]
+            if not 1 <= int(value) <= len(cameras):
+                raise ScenarioError(f"{file}: has {len(cameras)} cameras, not {value}: sweep cameras up to that")
+            yield key, json.dumps(cameras[: int(value)])
+        else:
+            yield key, value
+
+
+def _group(
+    study_name: str,
+    study: StudyOptions,
+    label: str,
+    scenario: Scenario,
+    settings: tuple[Setting, ...],
+    runs: int,
+) -> Group:
+    seeds = tuple(range(scenario.seed, scenario.seed + runs))
+    # Nothing that is resolved depends on the seed: the file need not be read for each.
+    parts = tuple(_parts(scenario.model_copy(update={"seed": seed}), study) for seed in seeds)
+    return Group(study_name, label, scenario.name, scenario.preset, settings, seeds, parts, scenario)
+
+
+def _parts(scenario: Scenario, study: StudyOptions) -> dict[Kind, Part]:
+    wanted = set(study.estimators)
+    with_single = scenario.baselines.single and "single" in wanted
+    parts: dict[Kind, Part] = {}
+    if wanted & {"dcpf", "single"}:
+        parts["cameras"] = cameras_part(scenario, with_single=with_single)
+    if scenario.baselines.cpf and "cpf" in wanted:
+        parts["central"] = central_part(scenario)
+        if study.jpeg_quality is not None:
+            parts["coded"] = central_part(scenario, study.jpeg_quality)
+    return parts
