@@ -1,75 +1,120 @@
-"""`dcpf compare`: many runs in process, paired by seed: a table, a plot, and the figures."""
+"""`dcpf compare`: many runs, paired by seed, over any keys of the scenario: a table, figures, and files."""
 
 import json
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-import joblib
 import typer
 from rich.console import Console
 from rich.table import Table
 
-from sim.commands.shared import AsJson, Frames, Overrides, progress_bar, read_scenario, split_overrides
-from sim.running.experiment import compare as compare_runs
-from sim.running.experiment import run_many
+from sim.commands.shared import AsJson, Frames, Overrides, progress_bar, split_overrides
+from sim.experiments.options import ExperimentOptions, StudyOptions, is_experiment, read_experiment
+from sim.experiments.sweeps import parse_sweep
 from sim.running.recorder import RecordingError
+from sim.scenario.document import read_document
+from sim.scenario.parsing import ScenarioError
 
 
 def compare(
-    scenarios: Annotated[list[Path], typer.Argument(metavar="SCENARIO...", help="Scenario files.")],
-    runs: Annotated[int, typer.Option(help="Seeds of each scenario, from the scenario's on.", min=1)] = 10,
+    scenarios: Annotated[
+        list[Path], typer.Argument(metavar="SCENARIO...", help="Scenario files, or one experiment file.")
+    ],
+    runs: Annotated[
+        int | None,
+        typer.Option(help="Seeds of each scenario, from the scenario's on; 10 by default.", min=1, show_default=False),
+    ] = None,
     frames: Frames = None,
     overrides: Overrides = None,
+    sweeps: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sweep",
+            metavar="KEY=VALUES",
+            help="Sweep any key of the scenario: network.iterations=1:20, filter.model_update.alpha=0:0.5:0.1"
+            " or network.graph=ring,star. Several make a grid; the first is the figure's axis.",
+        ),
+    ] = None,
     jobs: Annotated[int | None, typer.Option(help="Processes; all cores by default.", min=1)] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the results.", show_default=False)] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Dask scheduler to compute on instead, such as tcp://10.0.0.1:8786."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the results; what is finished there is not computed again.", show_default=False),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run scenarios with several seeds and compare DCPF, CPF and the single cameras."""
-    folder = out or Path("runs") / f"compare-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
+    """Run scenarios or an experiment with several seeds and compare DCPF, CPF and the single cameras."""
+    # What computes and draws takes its time to import; --help does not wait for it.
+    import joblib
+
+    from sim.experiments.claims import judge
+    from sim.experiments.engine import compute_here, compute_on_cluster
+    from sim.experiments.plan import make_plan
+    from sim.experiments.reporting import report, write_files
+    from sim.experiments.run import run_experiment
+    from sim.experiments.store import Store
+    from sim.pictures.experiment import write_figures
+
+    options, folder, place = _experiment(scenarios, sweeps or [])
+    if runs is not None:
+        options = options.model_copy(update={"runs": runs})
     given = [*split_overrides(overrides), *([("frames", str(frames))] if frames else [])]
-    first = [read_scenario(path, overrides, frames=frames) for path in scenarios]
-    _make(folder)
-    report: dict[str, Any] = {}
-    with progress_bar("runs", len(scenarios) * runs) as bar:
-        for path, scenario in zip(scenarios, first, strict=True):
-            seeds = range(scenario.seed, scenario.seed + runs)
-            summaries = []
-            for summary in run_many([path], given, seeds, jobs or joblib.cpu_count()):
-                summaries.append(summary)
-                bar(len(summaries) + runs * len(report))
-            label = f"{scenario.name} ({scenario.preset})"
-            if label in report:
-                label = f"{path} ({scenario.preset})"
-            report[label] = {**compare_runs(summaries), "summaries": summaries}
+    plan = make_plan(options, folder, given, place)
+    results = out or Path("runs") / f"{options.name}-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
+    store = Store(results / "cells")
+    engine = (
+        partial(compute_on_cluster, address=cluster)
+        if cluster
+        else partial(compute_here, n_jobs=jobs or joblib.cpu_count())
+    )
+    findings = run_experiment(plan, store, engine, partial(progress_bar, "parts of runs"))
+    verdicts = judge(findings)
+    found = report(findings, verdicts)
     try:
-        (folder / "comparison.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
-        _plot(report, folder)
+        write_files(findings, found, verdicts, results)
+        write_figures(findings, results)
     except OSError as error:
         raise RecordingError(
-            f"{folder}: cannot be written: {error.strerror}: free space, or name another --out"
+            f"{results}: cannot be written: {error.strerror}: free space, or name another --out"
         ) from error
     if as_json:
-        sys.stdout.write(json.dumps(report) + "\n")
+        sys.stdout.write(json.dumps(found) + "\n")
     else:
-        _print(report, folder)
+        _print(found, results)
 
 
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RecordingError(f"{folder}: cannot be made: {error.strerror}: name another --out") from error
-
-
-def _plot(report: dict[str, Any], folder: Path) -> None:
-    # Matplotlib takes its time to import, and only this needs it.
-    from sim.pictures.comparison import plot_comparison
-    from sim.pictures.plots import write_figure
-
-    rows = [{**run, "scenario": label} for label, each in report.items() for run in each["summaries"]]
-    write_figure(plot_comparison(rows), folder / "comparison")
+def _experiment(
+    paths: list[Path], sweeps: list[str]
+) -> tuple[ExperimentOptions, Path, Callable[[str, str], str]]:
+    """The experiment, the folder of its scenarios, and where its swept keys were written."""
+    documents = [read_document(path) for path in paths]
+    for path, document in zip(paths, documents, strict=True):
+        if is_experiment(document):
+            if len(paths) > 1:
+                raise ScenarioError(f"{path}: is an experiment: give it alone, or scenarios only")
+            if sweeps:
+                raise ScenarioError(f"{path}: is an experiment with sweeps of its own: take --sweep out")
+            return (
+                read_experiment(document),
+                path.parent,
+                lambda study, key: document.place(("studies", study, "sweep", key)),
+            )
+    chosen = dict((sweep.key, sweep.values) for sweep in map(parse_sweep, sweeps))
+    if len(chosen) < len(sweeps):
+        raise ScenarioError("--sweep: a key is swept twice: give its values in one list")
+    study = StudyOptions(plot="error" if chosen else "strips", sweep=chosen)
+    options = ExperimentOptions(
+        name="compare", scenarios=tuple(map(str, paths)), studies={"comparison": study}
+    )
+    return options, Path(), lambda _, key: f"--sweep {key}"
 
 
 def _print(report: dict[str, Any], folder: Path) -> None:

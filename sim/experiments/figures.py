@@ -1,57 +1,29 @@
-"""Many runs: each scenario with several seeds, paired between the estimators, over the cores."""
+"""The figures of many runs of one scenario with one setting."""
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
-import joblib
+import numpy as np
 
-from sim.assembly import Assembly
-from sim.running.in_process import run_in_process
-from sim.running.results import Results, summarize
-from sim.scenario.loading import load_scenario
+from sim.metrics.consistency import anees_band
+from sim.metrics.intervals import mean_interval
 
-Override = tuple[str, str]
+_ESTIMATORS = ("dcpf", "cpf", "best_single")
 
 
-def run_once(path: Path, overrides: Sequence[Override]) -> dict[str, Any]:
-    """One run in this process, and its summary."""
-    scenario = load_scenario(path, overrides)
-    results = Results(scenario)
-    for message in run_in_process(Assembly(scenario)):
-        results.add(message)
-    return summarize(results, processes=1)
-
-
-def run_many(
-    paths: Sequence[Path], overrides: Sequence[Override], seeds: Sequence[int], n_jobs: int
-) -> Iterator[dict[str, Any]]:
-    """Runs every scenario with every seed; the summaries come in this order, whatever the number of jobs.
-
-    Args:
-        paths: The scenario files.
-        overrides: Keys and values set in all of them.
-        seeds: Of the runs.
-        n_jobs: Processes to spread them over.
-    """
-    cells = [(path, [*overrides, ("seed", str(seed))]) for path in paths for seed in seeds]
-    if n_jobs == 1:
-        yield from (run_once(*cell) for cell in cells)
-        return
-    parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator", batch_size=1)
-    yield from parallel(joblib.delayed(run_once)(*cell) for cell in cells)
-
-
-def compare(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def compare(runs: Sequence[Mapping[str, Any]], n_axes: int) -> dict[str, Any]:
     """The figures of many runs of one scenario.
 
     Args:
         runs: Their summaries.
+        n_axes: Axes of the target's position.
 
     Returns:
-        Medians and worst values over the runs, in metres where they are lengths; None where there is no truth
-        or no such baseline.
+        Medians and worst values over the runs, in metres where they are lengths, and of the RMSE the mean with
+        its standard deviation and 95% confidence interval (bootstrap over the runs); None where there is no
+        truth or no such baseline. `anees_band95` is where a run's ANEES, averaged over the runs, lies if the
+        filter knows its error.
     """
     best = [_best_single(run) for run in runs]
     per_run = {
@@ -64,6 +36,7 @@ def compare(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {
         "runs": len(runs),
         "rmse_m": {name: _spread(values) for name, values in per_run.items()},
+        "mean_rmse_m": {name: _mean(values) for name, values in per_run.items()},
         "ratio_dcpf_cpf": _spread(ratios),
         "ratio_dcpf_best_single": _spread(of_best),
         "lost_fraction": {
@@ -71,15 +44,35 @@ def compare(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
         },
         "disagreement_m": _spread([run["disagreement_m"] for run in runs]),
         "anees": {name: _spread([run["anees"][name] for run in runs]) for name in ("dcpf", "cpf")},
+        "anees_band95": anees_band(len(runs), n_axes),
+        "tracking": {
+            name: _tracking([run["tracking"][name] for run in runs]) for name in ("dcpf", "cpf")
+        },
         "bytes_per_frame": runs[0]["network"]["bytes_per_frame"],
         "indefinite_local_fraction": _spread([run["fusion"]["indefinite_local_fraction"] for run in runs]),
     }
 
 
-def _best_single(run: dict[str, Any]) -> float | None:
+def _best_single(run: Mapping[str, Any]) -> float | None:
     return min((value for value in run["rmse_m"]["single"].values() if value is not None), default=None)
 
 
 def _spread(values: Sequence[float | None]) -> dict[str, float] | None:
     known = [value for value in values if value is not None]
     return {"median": median(known), "min": min(known), "max": max(known)} if known else None
+
+
+def _mean(values: Sequence[float | None]) -> dict[str, float] | None:
+    known = np.array([value for value in values if value is not None])
+    if not len(known):
+        return None
+    found = mean_interval(known)
+    deviation = float(known.std(ddof=1)) if len(known) > 1 else 0.0
+    return {"mean": found.value, "low95": found.low, "high95": found.high, "deviation": deviation}
+
+
+def _tracking(runs: Sequence[Mapping[str, Any] | None]) -> dict[str, Any] | None:
+    known = [run for run in runs if run is not None]
+    if not known:
+        return None
+    return {key: _spread([run[key] for run in known]) for key in known[0]}

@@ -1,7 +1,6 @@
 """The experiment file: which scenarios, what is swept, what is drawn, and what the figure should show."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, PositiveInt, model_validator
@@ -9,7 +8,7 @@ from pydantic import AfterValidator, Field, PositiveInt, model_validator
 from network.keys import check_name
 from network.options import Options
 from sim.scenario.complaints import validate
-from sim.scenario.document import Document, read_document
+from sim.scenario.document import Document
 from sim.scenario.presets import PresetName
 
 Name = Annotated[str, AfterValidator(check_name)]
@@ -53,10 +52,10 @@ class StudyOptions(Options):
 
     title: str = ""
     """What the figure shows, in a few words."""
-    plot: Literal["error", "paths", "bytes", "time", "strips"] = "error"
+    plot: Literal["error", "paths", "frames", "bytes", "time", "strips"] = "error"
     """`error`: RMSE over the first swept key, a line for each value of the others; `paths`: trajectories on the
-    ground and the error over time; `bytes`: RMSE over the bytes sent a frame; `time`: RMSE over processor
-    time; `strips`: a point a run."""
+    ground; `frames`: the error over time; `bytes`: RMSE over the bytes sent a frame; `time`: RMSE over
+    processor time; `strips`: a point a run."""
     sweep: Mapping[str, Values] = Field(default={}, max_length=3)
     """Dotted keys of the scenario with their values: `0:0.5:0.1`, `1:20` or `a,b,c` (the last value included), or
     a list. A number as the value of `cameras` takes the first so many."""
@@ -73,6 +72,14 @@ class StudyOptions(Options):
     pictures as bin indices in PNG, are counted too."""
     claims: tuple[Claim, ...] = ()
     """What the figure should show; said beside it with the figures measured, and whether it does."""
+
+    @model_validator(mode="after")
+    def _plot_has_its_axis(self) -> "StudyOptions":
+        if self.plot in {"error", "bytes", "time"} and not self.sweep:
+            raise ValueError(f"the plot {self.plot} is over a swept key: give sweep one, such as network.iterations")
+        if self.plot in {"paths", "frames"} and self.sweep:
+            raise ValueError(f"the plot {self.plot} shows one setting: take sweep out, and set the keys instead")
+        return self
 
     @model_validator(mode="after")
     def _claims_can_be_judged(self) -> "StudyOptions":
@@ -116,10 +123,10 @@ def is_experiment(document: Document) -> bool:
     return "studies" in document.data
 
 
-def read_experiment(path: Path) -> ExperimentOptions:
-    """Reads an experiment file.
+def read_experiment(document: Document) -> ExperimentOptions:
+    """The experiment that a file holds.
 
     Raises:
         ScenarioError: It is not as it must be; one line for each problem, with its place and the remedy.
     """
-    return validate(read_document(path), ExperimentOptions)
+    return validate(document, ExperimentOptions)

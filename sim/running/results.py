@@ -9,6 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from network.messages import EstimateMessage, StatusMessage, TruthMessage
+from sim.metrics.loss import losses
+from sim.metrics.sets import gospa, ospa
 from sim.running.metrics import LOST_FRAMES, anees, disagreement, is_lost, position_errors, rmse
 from sim.scenario.model import Scenario
 
@@ -130,6 +132,10 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
             "dcpf": _anees(results, list(dcpf.values())),
             "cpf": _anees(results, [cpf] if cpf else []),
         },
+        "tracking": {
+            "dcpf": _tracking(results, list(dcpf.values())),
+            "cpf": _tracking(results, [cpf] if cpf else []),
+        },
         "network": _network(results),
         "fusion": _fusion(results),
         "timing": {**results.timing, **_timing(results)},
@@ -158,6 +164,21 @@ def _anees(results: Results, tracks: list[Track]) -> float | None:
     each = np.array([anees(results.means(t)[1:], results.covariances(t)[1:], truth[1:]) for t in tracks])
     known = each[~np.isnan(each)]
     return _number(float(known.mean())) if known.size else None
+
+
+def _tracking(results: Results, tracks: list[Track]) -> dict[str, float | None] | None:
+    """The mean OSPA and GOSPA of an estimator's nodes, its losses of the target, and how long they lasted."""
+    known = [e for track in tracks if (e := results.errors(track)) is not None]
+    if not known:
+        return None
+    each = [loss for errors in known for loss in losses(errors)]
+    found_after = [loss.found - loss.first for loss in each if loss.found is not None]
+    return {
+        "ospa_m": float(np.mean([ospa(errors) for errors in known])),
+        "gospa_m": float(np.sqrt(np.mean([gospa(errors) ** 2 for errors in known]))),
+        "losses_per_node": len(each) / len(known),
+        "reacquired_after_s": float(np.mean(found_after)) / results.scenario.rate_hz if found_after else None,
+    }
 
 
 def _network(results: Results) -> dict[str, Any]:
