@@ -2,10 +2,10 @@
 
 import json
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from sim.commands.shared import AsJson, Frames, Overrides, progress_bar, split_overrides
+from sim.experiments.claims import Verdict
 from sim.experiments.options import ExperimentOptions, StudyOptions, is_experiment, read_experiment
 from sim.experiments.sweeps import parse_sweep
 from sim.running.recorder import RecordingError
@@ -27,7 +28,9 @@ def compare(
     ],
     runs: Annotated[
         int | None,
-        typer.Option(help="Seeds of each scenario, from the scenario's on; 10 by default.", min=1, show_default=False),
+        typer.Option(
+            help="Seeds of each scenario, from the scenario's on; 10 by default.", min=1, show_default=False
+        ),
     ] = None,
     frames: Frames = None,
     overrides: Overrides = None,
@@ -43,11 +46,15 @@ def compare(
     jobs: Annotated[int | None, typer.Option(help="Processes; all cores by default.", min=1)] = None,
     cluster: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="Dask scheduler to compute on instead, such as tcp://10.0.0.1:8786."),
+        typer.Option(
+            metavar="ADDRESS", help="Dask scheduler to compute on instead, such as tcp://10.0.0.1:8786."
+        ),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder of the results; what is finished there is not computed again.", show_default=False),
+        typer.Option(
+            help="Folder of the results; what is finished there is not computed again.", show_default=False
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -88,26 +95,26 @@ def compare(
     if as_json:
         sys.stdout.write(json.dumps(found) + "\n")
     else:
-        _print(found, results)
+        _print({label: each for label, each in found.items() if label != "claims"}, verdicts, results)
 
 
 def _experiment(
     paths: list[Path], sweeps: list[str]
 ) -> tuple[ExperimentOptions, Path, Callable[[str, str], str]]:
     """The experiment, the folder of its scenarios, and where its swept keys were written."""
-    documents = [read_document(path) for path in paths]
-    for path, document in zip(paths, documents, strict=True):
-        if is_experiment(document):
-            if len(paths) > 1:
-                raise ScenarioError(f"{path}: is an experiment: give it alone, or scenarios only")
-            if sweeps:
-                raise ScenarioError(f"{path}: is an experiment with sweeps of its own: take --sweep out")
-            return (
-                read_experiment(document),
-                path.parent,
-                lambda study, key: document.place(("studies", study, "sweep", key)),
-            )
-    chosen = dict((sweep.key, sweep.values) for sweep in map(parse_sweep, sweeps))
+    documents = [document for document in map(read_document, paths) if is_experiment(document)]
+    if documents:
+        document, *_ = documents
+        if len(paths) > 1:
+            raise ScenarioError(f"{document.path}: is an experiment: give it alone, or scenarios only")
+        if sweeps:
+            raise ScenarioError(f"{document.path}: is an experiment with sweeps of its own: take --sweep out")
+        return (
+            read_experiment(document),
+            document.path.parent,
+            lambda study, key: document.place(("studies", study, "sweep", key)),
+        )
+    chosen = {sweep.key: sweep.values for sweep in map(parse_sweep, sweeps)}
     if len(chosen) < len(sweeps):
         raise ScenarioError("--sweep: a key is swept twice: give its values in one list")
     study = StudyOptions(plot="error" if chosen else "strips", sweep=chosen)
@@ -117,39 +124,58 @@ def _experiment(
     return options, Path(), lambda _, key: f"--sweep {key}"
 
 
-def _print(report: dict[str, Any], folder: Path) -> None:
-    console = Console(highlight=False)
+def _print(found: dict[str, Any], verdicts: Sequence[Verdict], folder: Path) -> None:
+    # In a pipe, no line need fit a terminal.
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else 200)
+    for settings, rows in groupby(found.items(), key=lambda item: tuple(item[1]["settings"])):
+        _print_table(console, settings, dict(rows))
+    for label, each in found.items():
+        if not each["settings"]:
+            _print_more(console, label, each)
+    for verdict in verdicts:
+        holds = "holds" if verdict.holds else "does not hold"
+        console.print(
+            f"{verdict.study}, {verdict.label}, {verdict.claim}: {holds}: {verdict.text}", soft_wrap=True
+        )
+    console.print(f"figures and plots in {folder}", soft_wrap=True)
+
+
+def _print_table(console: Console, keys: tuple[str, ...], rows: dict[str, Any]) -> None:
+    """A table of groups with the same swept keys: median and worst run, or the median alone of many."""
     table = Table()
-    table.add_column("scenario", no_wrap=True)
-    table.add_column("over the runs", no_wrap=True)
+    for heading in ("scenario", *keys, "over the runs"):
+        table.add_column(heading, no_wrap=True)
     for heading in ("DCPF", "CPF", "best single", "DCPF/CPF", "ANEES"):
         table.add_column(heading, justify="right", no_wrap=True)
-    for label, each in report.items():
-        rmse = each["rmse_m"]
-        for title, row, statistic in (
-            ("median", label, "median"),
-            ("worst", f"  {each['runs']} runs", "max"),
-        ):
+    for label, each in rows.items():
+        name = label.removesuffix(", ".join(f"{key}={value}" for key, value in each["settings"].items()))
+        statistics = [("median", name.strip(), "median"), ("worst", f"  {each['runs']} runs", "max")]
+        for title, row, statistic in statistics[: 1 if keys else 2]:
             table.add_row(
                 row,
+                *each["settings"].values(),
                 title,
-                *(_figure(rmse[name], statistic, " m", 3) for name in ("dcpf", "cpf", "best_single")),
+                *(
+                    _figure(each["rmse_m"][name], statistic, " m", 3)
+                    for name in ("dcpf", "cpf", "best_single")
+                ),
                 _figure(each["ratio_dcpf_cpf"], statistic, "", 2),
                 _figure(each["anees"]["dcpf"], statistic, "", 2),
             )
     console.print(table)
-    for label, each in report.items():
-        lost, disagreement = each["lost_fraction"], _figure(each["disagreement_m"], "median", " m", 3)
-        console.print(
-            f"{label}: target lost in {lost['dcpf']:.0%} of the runs by DCPF, in {lost['cpf']:.0%} by CPF;"
-            f" nodes disagree by {disagreement}",
-            soft_wrap=True,
-        )
-        indefinite = each["indefinite_local_fraction"]
-        if indefinite and indefinite["max"]:
-            share = f"{indefinite['median']:.0%}"
-            console.print(f"  Eq. 17's ratio was no density in {share} of the local results", soft_wrap=True)
-    console.print(f"figures and plots in {folder}", soft_wrap=True)
+
+
+def _print_more(console: Console, label: str, each: dict[str, Any]) -> None:
+    lost, disagreement = each["lost_fraction"], _figure(each["disagreement_m"], "median", " m", 3)
+    console.print(
+        f"{label}: target lost in {lost['dcpf']:.0%} of the runs by DCPF, in {lost['cpf']:.0%} by CPF;"
+        f" nodes disagree by {disagreement}",
+        soft_wrap=True,
+    )
+    indefinite = each["indefinite_local_fraction"]
+    if indefinite and indefinite["max"]:
+        share = f"{indefinite['median']:.0%}"
+        console.print(f"  Eq. 17's ratio was no density in {share} of the local results", soft_wrap=True)
 
 
 def _figure(values: dict[str, float] | None, statistic: str, unit: str, digits: int) -> str:

@@ -64,8 +64,8 @@ def _flat(groups: Sequence[GroupFindings]) -> tuple[bool, str]:
     each = np.array([group.node_rmse("single").mean(axis=0) for group in groups])
     single = float(np.mean(each.max(axis=0) - each.min(axis=0)))
     text = (
-        f"over {key}, DCPF's mean RMSE changes by {ours:.3f} m, a single camera's by {single:.3f} m in the mean"
-        f" (the best one's by {best:.3f} m)."
+        f"over {key}, DCPF's mean RMSE changes by {ours:.3f} m, a single camera's by {single:.3f} m in the"
+        f" mean (the best one's by {best:.3f} m)."
     )
     return ours <= FLAT * single, text
 

@@ -1,21 +1,21 @@
 """Where parts are computed: in this process, in processes of this machine, or on a cluster engine."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from typing import Any
 
 import joblib
 from joblib.externals.loky import get_reusable_executor
 
+from sim.experiments.errors import EngineError
 from sim.experiments.parts import Part, code_version
 from sim.experiments.work import compute
-from sim.scenario.parsing import ScenarioError
 
 Result = tuple[Part, dict[str, Any]]
 
 _CONNECT_S = 10
 
 
-def compute_here(parts: Sequence[Part], n_jobs: int) -> Iterator[Result]:
+def compute_here(parts: Sequence[Part], n_jobs: int) -> Generator[Result, None, None]:
     """Computes parts on this machine, and yields each when it is done.
 
     Args:
@@ -33,7 +33,7 @@ def compute_here(parts: Sequence[Part], n_jobs: int) -> Iterator[Result]:
         get_reusable_executor().shutdown(wait=True, kill_workers=True)
 
 
-def compute_on_cluster(parts: Sequence[Part], address: str) -> Iterator[Result]:
+def compute_on_cluster(parts: Sequence[Part], address: str) -> Generator[Result, None, None]:
     """Computes parts on a Dask cluster, and yields each when it is done.
 
     Args:
@@ -41,25 +41,25 @@ def compute_on_cluster(parts: Sequence[Part], address: str) -> Iterator[Result]:
         address: Of its scheduler, such as `tcp://10.0.0.1:8786`.
 
     Raises:
-        ScenarioError: Nobody answers there, or Dask is not installed here.
-        OtherCode: The workers run another version of the program.
+        EngineError: Nobody answers there, Dask is not installed here, or the workers run
+            another version of the program.
     """
     try:
         from distributed import Client, as_completed  # noqa: PLC0415 - an extra
     except ImportError:
-        raise ScenarioError('--cluster needs Dask: pip install "dcpf[cluster]"') from None
+        raise EngineError('--cluster needs Dask: pip install "dcpf[cluster]"') from None
     try:
-        client = Client(address, timeout=_CONNECT_S)
+        client = Client(address, timeout=_CONNECT_S)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
-        raise ScenarioError(
+        raise EngineError(
             f"--cluster {address}: no Dask scheduler answers there: start one, or name another address"
         ) from error
     with client:
         futures = client.map(_with_part, parts, code=code_version(), pure=False)
         try:
-            yield from (result for _, result in as_completed(futures, with_results=True))
+            yield from (result for _, result in as_completed(futures, with_results=True))  # type: ignore[no-untyped-call]
         finally:
-            client.cancel(futures)
+            client.cancel(futures)  # type: ignore[no-untyped-call]
 
 
 def _with_part(part: Part, code: str) -> Result:

@@ -20,10 +20,10 @@ def compare(runs: Sequence[Mapping[str, Any]], n_axes: int) -> dict[str, Any]:
         n_axes: Axes of the target's position.
 
     Returns:
-        Medians and worst values over the runs, in metres where they are lengths, and of the RMSE the mean with
-        its standard deviation and 95% confidence interval (bootstrap over the runs); None where there is no
-        truth or no such baseline. `anees_band95` is where a run's ANEES, averaged over the runs, lies if the
-        filter knows its error.
+        Medians and worst values over the runs, in metres where they are lengths, and of the RMSE the mean
+        with its standard deviation and 95% confidence interval (bootstrap over the runs); None where there is
+        no truth or no such baseline. `anees_band95` is where the mean of the runs' ANEES lies if the filter
+        knows its error and a run's errors are all one: the widest that the band can be.
     """
     best = [_best_single(run) for run in runs]
     per_run = {
@@ -45,9 +45,7 @@ def compare(runs: Sequence[Mapping[str, Any]], n_axes: int) -> dict[str, Any]:
         "disagreement_m": _spread([run["disagreement_m"] for run in runs]),
         "anees": {name: _spread([run["anees"][name] for run in runs]) for name in ("dcpf", "cpf")},
         "anees_band95": anees_band(len(runs), n_axes),
-        "tracking": {
-            name: _tracking([run["tracking"][name] for run in runs]) for name in ("dcpf", "cpf")
-        },
+        "tracking": {name: _tracking([run["tracking"][name] for run in runs]) for name in ("dcpf", "cpf")},
         "bytes_per_frame": runs[0]["network"]["bytes_per_frame"],
         "indefinite_local_fraction": _spread([run["fusion"]["indefinite_local_fraction"] for run in runs]),
     }

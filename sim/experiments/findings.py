@@ -73,7 +73,7 @@ class GroupFindings:
         return np.array([[rmse(errors) for errors in run] for run in self.node_errors(track)])
 
     def best(self, track: Track) -> Int[np.ndarray, "R C"]:
-        """The nodes of each run that stand for the estimator: all of them, but the best single camera only."""
+        """The nodes of each run that stand for the estimator: all, but of single cameras the best only."""
         rmse_m = self.node_rmse(track)
         if track == "single":
             return np.nan_to_num(rmse_m, nan=np.inf).argmin(axis=1)[:, None]

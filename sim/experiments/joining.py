@@ -21,4 +21,8 @@ def joined(summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     for key in ("bytes_per_frame", "bytes_at_start"):
         network[key] = {**network[key], "cpf": central["network"][key]["cpf"]}
     ours, theirs = whole["rmse_m"]["dcpf"], whole["rmse_m"]["cpf"]
-    return {**whole, "network": network, "ratio_dcpf_cpf": ours / theirs if ours is not None and theirs else None}
+    return {
+        **whole,
+        "network": network,
+        "ratio_dcpf_cpf": ours / theirs if ours is not None and theirs else None,
+    }

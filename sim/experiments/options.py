@@ -37,7 +37,7 @@ class WithinClaim(Options):
 
 
 class NoisierClaim(Options):
-    """DCPF's error varies more from run to run with the first value of the study's second key than the last."""
+    """DCPF's error varies more between runs with the first value of the second swept key than the last."""
 
     kind: Literal["noisier"]
     otherwise: str = ""
@@ -53,12 +53,12 @@ class StudyOptions(Options):
     title: str = ""
     """What the figure shows, in a few words."""
     plot: Literal["error", "paths", "frames", "bytes", "time", "strips"] = "error"
-    """`error`: RMSE over the first swept key, a line for each value of the others; `paths`: trajectories on the
-    ground; `frames`: the error over time; `bytes`: RMSE over the bytes sent a frame; `time`: RMSE over
+    """`error`: RMSE over the first swept key, a line for each value of the others; `paths`: trajectories on
+    the ground; `frames`: the error over time; `bytes`: RMSE over the bytes sent a frame; `time`: RMSE over
     processor time; `strips`: a point a run."""
     sweep: Mapping[str, Values] = Field(default={}, max_length=3)
-    """Dotted keys of the scenario with their values: `0:0.5:0.1`, `1:20` or `a,b,c` (the last value included), or
-    a list. A number as the value of `cameras` takes the first so many."""
+    """Dotted keys of the scenario with their values: `0:0.5:0.1`, `1:20` (the last included), `a,b,c`, or a
+    list. A number as the value of `cameras` takes the first so many."""
     set: Mapping[str, Any] = Field(default={})
     """Dotted keys of the scenario that this study sets, after the experiment's own."""
     estimators: tuple[Estimator, ...] = Field(default=("dcpf", "cpf", "single"), min_length=1)
@@ -68,17 +68,21 @@ class StudyOptions(Options):
     presets: tuple[PresetName, ...] = ()
     """Other presets than the experiment's."""
     jpeg_quality: int | None = Field(default=None, ge=1, le=100)
-    """Whether CPF also runs on pictures that were sent as JPEG of this quality; the bytes of these, and of the
-    pictures as bin indices in PNG, are counted too."""
+    """If given, CPF also runs on pictures that were sent as JPEG of this quality; the bytes of these, and of
+    the pictures as bin indices in PNG, are counted too."""
     claims: tuple[Claim, ...] = ()
     """What the figure should show; said beside it with the figures measured, and whether it does."""
 
     @model_validator(mode="after")
     def _plot_has_its_axis(self) -> "StudyOptions":
         if self.plot in {"error", "bytes", "time"} and not self.sweep:
-            raise ValueError(f"the plot {self.plot} is over a swept key: give sweep one, such as network.iterations")
+            raise ValueError(
+                f"the plot {self.plot} is over a swept key: give sweep one, such as network.iterations"
+            )
         if self.plot in {"paths", "frames"} and self.sweep:
-            raise ValueError(f"the plot {self.plot} shows one setting: take sweep out, and set the keys instead")
+            raise ValueError(
+                f"the plot {self.plot} shows one setting: take sweep out, and set the keys instead"
+            )
         return self
 
     @model_validator(mode="after")
@@ -88,7 +92,9 @@ class StudyOptions(Options):
             others = {"flat": {"dcpf", "single"}, "within": {"dcpf", "cpf"}, "noisier": {"dcpf"}}[claim.kind]
             if len(self.sweep) < needed or not others <= set(self.estimators):
                 names = " and ".join(sorted(others))
-                raise ValueError(f"the claim {claim.kind} needs {needed} swept keys and the estimators {names}")
+                raise ValueError(
+                    f"the claim {claim.kind} needs {needed} swept keys and the estimators {names}"
+                )
         return self
 
 
@@ -114,7 +120,9 @@ class ExperimentOptions(Options):
     def _page_of_studies(self) -> "ExperimentOptions":
         for name in self.page:
             if name not in self.studies:
-                raise ValueError(f"page names {name}, which is no study: take some of {', '.join(self.studies)}")
+                raise ValueError(
+                    f"page names {name}, which is no study: take some of {', '.join(self.studies)}"
+                )
         return self
 
 

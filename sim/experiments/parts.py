@@ -1,7 +1,7 @@
 """What an experiment computes: parts of runs, each known by a key of everything that it depends on.
 
-A run falls into the cameras' part (DCPF, single cameras) and the central node's (CPF), which share the pictures
-and nothing else. So CPF is not run again for every graph, and what has been computed is found again.
+A run falls into the cameras' part (DCPF, single cameras) and the central node's (CPF), which share the
+pictures and nothing else. So CPF is not run again for every graph, and what has been computed is found again.
 """
 
 import hashlib

@@ -1,4 +1,4 @@
-"""The pictures of an experiment's runs: rendered once for all parts that share them, and sent in other codings."""
+"""The pictures of an experiment's runs: made once for all parts that share them, and sent in other codings."""
 
 import time
 from functools import cached_property, lru_cache
@@ -66,10 +66,9 @@ class CodedSource:
     """A camera's pictures as they arrive after JPEG, with the size of each way to send them.
 
     Attributes:
-        spent_s: Processor time that the pictures and their coding took.
         jpeg_bytes: Of all pictures read, as JPEG.
-        bins_bytes: Of all pictures read, as bin indices in PNG, which loses nothing: a filter on them finds what
-            it finds on the raw pictures.
+        bins_bytes: Of all pictures read, as bin indices in PNG, which loses nothing: a filter on them finds
+            what it finds on the raw pictures.
     """
 
     def __init__(self, source: KeptSource, quality: int, color: ColorOptions) -> None:
@@ -80,6 +79,7 @@ class CodedSource:
 
     @property
     def spent_s(self) -> float:
+        """Processor time that the pictures and their coding took."""
         return self._source.spent_s + self._spent_s
 
     def read(self, index: int) -> Picture:

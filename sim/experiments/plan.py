@@ -1,4 +1,4 @@
-"""From an experiment to everything that has to be computed: studies, their groups of runs, the runs' parts."""
+"""From an experiment to everything that has to be computed: its studies, their groups of runs, their parts."""
 
 import itertools
 import json
@@ -9,8 +9,8 @@ from pathlib import Path
 from sim.experiments.options import ExperimentOptions, StudyOptions
 from sim.experiments.parts import Kind, Part, cameras_part, central_part
 from sim.experiments.sweeps import as_text, require_key, texts
-from sim.scenario.document import read_document
-from sim.scenario.loading import load_scenario
+from sim.scenario.document import Document, read_document
+from sim.scenario.loading import resolve
 from sim.scenario.model import Scenario
 from sim.scenario.parsing import ScenarioError
 
@@ -88,23 +88,27 @@ def make_plan(
         for path, preset in itertools.product(
             study.scenarios or options.scenarios, study.presets or options.presets or (None,)
         ):
-            file = folder / path
+            document = read_document(folder / path)
             chosen = [("preset", preset)] if preset else []
             given = [*chosen, *fixed, *overrides]
-            _check_keys(name, study, file, given, place)
+            _check_keys(name, study, document, given, place)
             for settings in _settings(name, study, place):
-                scenario = load_scenario(file, [*given, *_in_file(settings, file)])
+                scenario = resolve(document, [*given, *_in_file(settings, document)])
                 label = f"{scenario.name} ({scenario.preset})"
-                if labels.setdefault(label, file) != file:
-                    label = f"{file} ({scenario.preset})"
+                if labels.setdefault(label, document.path) != document.path:
+                    label = f"{document.path} ({scenario.preset})"
                 groups.append(_group(name, study, label, scenario, settings, options.runs))
     return Plan(options, tuple(groups))
 
 
 def _check_keys(
-    name: str, study: StudyOptions, file: Path, given: Iterable[Setting], place: Callable[[str, str], str]
+    name: str,
+    study: StudyOptions,
+    document: Document,
+    given: Iterable[Setting],
+    place: Callable[[str, str], str],
 ) -> None:
-    resolved = load_scenario(file, given).model_dump(mode="json")
+    resolved = resolve(document, given).model_dump(mode="json")
     for key in study.sweep:
         require_key(key, resolved, place(name, key))
 
@@ -119,13 +123,15 @@ def _settings(
     return itertools.product(*axes)
 
 
-def _in_file(settings: Iterable[Setting], file: Path) -> Iterator[Setting]:
+def _in_file(settings: Iterable[Setting], document: Document) -> Iterator[Setting]:
     """The settings as the scenario file would have them: so many cameras are the first so many."""
     for key, value in settings:
         if key == "cameras" and value.isdecimal():
-            cameras = read_document(file).data["cameras"]
+            cameras = document.data["cameras"]
             if not 1 <= int(value) <= len(cameras):
-                raise ScenarioError(f"{file}: has {len(cameras)} cameras, not {value}: sweep cameras up to that")
+                raise ScenarioError(
+                    f"{document.path}: has {len(cameras)} cameras, not {value}: sweep cameras up to that"
+                )
             yield key, json.dumps(cameras[: int(value)])
         else:
             yield key, value

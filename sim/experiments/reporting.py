@@ -1,4 +1,4 @@
-"""The files of an experiment: cells as JSON lines, the summary as JSON and CSV, what the figures show as text.
+"""The files of an experiment: cells as JSON lines, the summary as JSON and CSV, its claims as text.
 
 Everything here depends on the experiment alone; what depends on the machine goes into `timing.json`.
 """
@@ -14,6 +14,7 @@ import numpy as np
 from sim.experiments.claims import Verdict, as_data
 from sim.experiments.figures import compare
 from sim.experiments.findings import Findings, GroupFindings, Track
+from sim.experiments.work import as_plain
 from sim.metrics.intervals import mean_interval
 from sim.metrics.sets import gospa, ospa
 from sim.running.metrics import is_lost
@@ -37,11 +38,15 @@ def report(findings: Findings, verdicts: Sequence[Verdict]) -> dict[str, Any]:
 def title(findings: Findings, each: GroupFindings) -> str:
     """What a group is called in tables: study, if there are several, scenario, preset and settings."""
     study = [f"{each.group.study}:"] if len(findings.options.studies) > 1 else []
-    settings = [", ".join(f"{key}={value}" for key, value in each.group.settings)] if each.group.settings else []
+    settings = (
+        [", ".join(f"{key}={value}" for key, value in each.group.settings)] if each.group.settings else []
+    )
     return " ".join([*study, each.group.label, *settings])
 
 
-def write_files(findings: Findings, found: Mapping[str, Any], verdicts: Sequence[Verdict], folder: Path) -> None:
+def write_files(
+    findings: Findings, found: Mapping[str, Any], verdicts: Sequence[Verdict], folder: Path
+) -> None:
     """Writes `comparison.json`, `cells.jsonl`, `summary.csv`, `timing.json` and, with claims, `claims.md`.
 
     Raises:
@@ -92,10 +97,7 @@ def _cells(each: GroupFindings) -> Iterator[dict[str, Any]]:
             **{key: summary[key] for key in ("rmse_m", "lost", "anees", "disagreement_m", "tracking")},
             "rmse_coded_m": float(each.rmse("coded")[run]) if "coded" in errors else None,
             "bytes_per_frame": summary["network"]["bytes_per_frame"],
-            "errors_m": {
-                track: np.where(np.isfinite(found), found.round(5), None).tolist()  # type: ignore[call-overload]
-                for track, found in by_frame.items()
-            },
+            "errors_m": {track: as_plain(found, 5) for track, found in by_frame.items()},
         }
 
 
@@ -127,7 +129,7 @@ def _rows(each: GroupFindings) -> Iterator[dict[str, Any]]:
             "ospa_m": f"{np.mean([ospa(node) for run in errors for node in run]):.5f}",
             "gospa_m": f"{np.sqrt(np.mean([gospa(node) ** 2 for run in errors for node in run])):.5f}",
             "anees": f"{np.nanmean(nees) / n_axes:.4f}",
-            "bytes_per_frame": f"{sent.get({'dcpf': 'dcpf', 'cpf': 'cpf', 'coded': 'jpeg'}.get(track, ''), 0):.0f}",
+            "bytes_per_frame": f"{sent.get('jpeg' if track == 'coded' else track, 0.0):.0f}",
         }
 
 

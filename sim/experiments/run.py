@@ -1,6 +1,6 @@
 """Runs an experiment: what is on disk is read, the rest is computed and kept."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import AbstractContextManager, closing
 from typing import Any
 
@@ -10,7 +10,7 @@ from sim.experiments.parts import Part
 from sim.experiments.plan import Plan
 from sim.experiments.store import Store
 
-Engine = Callable[[list[Part]], Iterator[Result]]
+Engine = Callable[[list[Part]], Generator[Result, None, None]]
 ProgressBar = Callable[[int], AbstractContextManager[Callable[[int], None]]]
 
 

@@ -22,7 +22,7 @@ class Sweep:
 
 
 def parse_sweep(text: str) -> Sweep:
-    """A sweep from the command line, such as ``filter.n_particles=100:500:100`` or ``network.graph=ring,star``.
+    """A sweep from the command line, such as ``network.iterations=1:20`` or ``network.graph=ring,star``.
 
     Raises:
         ScenarioError: It is not written like that.
@@ -96,7 +96,9 @@ def _dotted_keys(data: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
             yield from _dotted_keys(value, f"{prefix}{key}.")
         elif isinstance(value, list):
             for index, item in enumerate(value):
-                names = [str(index)] + ([str(item["name"])] if isinstance(item, Mapping) and "name" in item else [])
+                names = [str(index)] + (
+                    [str(item["name"])] if isinstance(item, Mapping) and "name" in item else []
+                )
                 for name in names:
                     yield f"{prefix}{key}.{name}"
                     if isinstance(item, Mapping):
@@ -113,7 +115,9 @@ def _range(text: str, source: str) -> tuple[str, ...]:
     if len(steps) > 1 or step <= 0 or count < 1:
         raise ScenarioError(f"{source}: {text} is empty or has too many colons: write it like 0:0.5:0.1")
     if count > MAX_VALUES:
-        raise ScenarioError(f"{source}: {text} has {count} values, at most {MAX_VALUES} do: take a larger step")
+        raise ScenarioError(
+            f"{source}: {text} has {count} values, at most {MAX_VALUES} do: take a larger step"
+        )
     # Decimals, so that 0.3 is 0.3 and not the sum of three tenths.
     return tuple(f"{(first + index * step).normalize():f}" for index in range(count))
 

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.assembly import Assembly
+from sim.experiments.errors import EngineError
 from sim.experiments.parts import Part, code_version
 from sim.experiments.pictures import CodedSource, KeptSource, kept_pictures
 from sim.metrics.consistency import nees
@@ -17,10 +18,6 @@ from sim.scenario.model import Scenario
 
 _DIGITS = 5
 """Of positions in metres: a hundredth of a millimetre."""
-
-
-class OtherCode(Exception):
-    """A worker's program is not the one that asks it."""
 
 
 def compute(part: Part, code: str) -> dict[str, Any]:
@@ -33,13 +30,15 @@ def compute(part: Part, code: str) -> dict[str, Any]:
     Returns:
         `summary`, as `summary.json` has it; `tracks`: of each `estimator/node` the `positions` in m and the
         `nees` from frame 0 on, None where there is none; `truth`: the true positions; `cpu_ms_per_frame`:
-        processor time of all nodes together, without making the pictures; `bytes_per_frame` of coded pictures.
+        processor time of all nodes together, without the making of pictures; `bytes_per_frame` of coded ones.
 
     Raises:
-        OtherCode: This process runs another version of the program.
+        EngineError: This process runs another version of the program.
     """
     if code != code_version():
-        raise OtherCode("the workers run another version of dcpf: install this one there and start them again")
+        raise EngineError(
+            "the workers run another version of dcpf: install this one there and start them again"
+        )
     scenario = Scenario.model_validate_json(part.scenario)
     assembly = Assembly(scenario)
     kept = kept_pictures(part.pictures)
@@ -71,13 +70,15 @@ def compute(part: Part, code: str) -> dict[str, Any]:
 def _track(results: Results, track: Track) -> dict[str, Any]:
     means, truth = results.means(track), results.true_states()
     found = None if truth is None else nees(means, results.covariances(track), truth)
-    return {"positions": _positions(means), "nees": None if found is None else _plain(found, 4)}
+    return {"positions": _positions(means), "nees": None if found is None else as_plain(found, 4)}
 
 
 def _positions(states: Float[np.ndarray, "T D"] | None) -> list[Any] | None:
-    return None if states is None else _plain(states[:, : states.shape[1] // 2], _DIGITS)
+    return None if states is None else as_plain(states[:, : states.shape[1] // 2], _DIGITS)
 
 
-def _plain(values: Float[np.ndarray, "T ..."], digits: int) -> list[Any]:
-    """Numbers for JSON; None for what is not finite."""
-    return np.where(np.isfinite(values), np.round(values, digits), None).tolist()  # type: ignore[call-overload,no-any-return]
+def as_plain(values: Float[np.ndarray, "..."], digits: int) -> list[Any]:
+    """Numbers for JSON, rounded; None for what is not finite."""
+    plain = np.round(values, digits).astype(object)
+    plain[~np.isfinite(values)] = None
+    return list(plain.tolist())

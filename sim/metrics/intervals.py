@@ -38,7 +38,7 @@ def bootstrap(
     """A statistic of runs with its percentile interval; the same runs give the same interval.
 
     Args:
-        samples: A row a run, of what was measured in it; rows are resampled whole, so what is paired stays so.
+        samples: A row a run, of what was measured in it; rows are drawn whole, so what is paired stays so.
         statistic: From sets of R runs to their figures, one each.
         confidence: Of the interval, two-sided.
     """

@@ -23,7 +23,9 @@ def ospa(errors: Float[np.ndarray, " T"], cutoff: float = CUTOFF) -> Float[np.nd
     return np.where(np.isnan(errors), cutoff, np.fmin(errors, cutoff))
 
 
-def gospa(errors: Float[np.ndarray, " T"], cutoff: float = CUTOFF, order: float = 2) -> Float[np.ndarray, " T"]:
+def gospa(
+    errors: Float[np.ndarray, " T"], cutoff: float = CUTOFF, order: float = 2
+) -> Float[np.ndarray, " T"]:
     """GOSPA (α = 2) in each frame: min(c, ‖x - y‖), and c / 2^(1/p) where the one target has no estimate.
 
     A target that is farther than c from its estimate counts as one missed and one false: c in all.

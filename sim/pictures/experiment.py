@@ -43,10 +43,16 @@ def plot_study(findings: Findings, name: str) -> Figure:
     """The figure of a study: a column a scenario, a row a preset."""
     presets = _presets(findings, [name])
     rows = [
-        [(label, findings.study(name, label)) for label in findings.labels(name) if label.endswith(f"({preset})")]
+        [
+            (label, findings.study(name, label))
+            for label in findings.labels(name)
+            if label.endswith(f"({preset})")
+        ]
         for preset in presets
     ]
-    return _grid([(findings.options.studies[name].plot, row) for row in rows], findings.options.studies[name].title)
+    return _grid(
+        [(findings.options.studies[name].plot, row) for row in rows], findings.options.studies[name].title
+    )
 
 
 def plot_page(findings: Findings, preset: str) -> Figure:

@@ -30,20 +30,29 @@ _NAMES: dict[Track, str] = {
     "single": "best single camera",
     "coded": "CPF, JPEG",
 }
-_TINTS: dict[Track, str] = {"dcpf": COLORS["dcpf"], "cpf": COLORS["cpf"], "single": COLORS["single"], "coded": "#56B4E9"}
+_TINTS: dict[Track, str] = {
+    "dcpf": COLORS["dcpf"],
+    "cpf": COLORS["cpf"],
+    "single": COLORS["single"],
+    "coded": "#56B4E9",
+}
 _DASHES = ("-", "--", ":", "-.")
 _RMSE = "RMSE of the position / m"
 
 
 def draw_error(axes: Axes, groups: Sequence[GroupFindings]) -> None:
-    """Mean RMSE over the first swept key, in a band of 95% confidence; a dash for each value of the others."""
+    """Mean RMSE over the first swept key in a band of 95% confidence, a dash for each value of the others."""
     key, *others = (name for name, _ in groups[0].group.settings)
     values = list(dict.fromkeys(group.settings[key] for group in groups))
     numbers, is_number = _numbers(values)
-    combinations = list(product(*(dict.fromkeys(group.settings[name] for group in groups) for name in others)))
+    combinations = list(
+        product(*(dict.fromkeys(group.settings[name] for group in groups) for name in others))
+    )
     for dash, combination in zip(_DASHES * len(combinations), combinations, strict=False):
         line = [g for g in groups if tuple(g.settings[name] for name in others) == combination]
-        label = "".join(f", {_short(name)} = {value}" for name, value in zip(others, combination, strict=True))
+        label = "".join(
+            f", {_short(name)} = {value}" for name, value in zip(others, combination, strict=True)
+        )
         _draw_cameras(axes, numbers, line)
         for track in ("single", "cpf", "dcpf"):
             if line[0].has(track):
@@ -65,7 +74,8 @@ def draw_paths(axes: Axes, groups: Sequence[GroupFindings]) -> None:
     truth = group.truth()[:, :, :2]
     middle = truth.mean(axis=0)
     axes.plot(*middle.T, color=COLORS["truth"], linewidth=4.0, alpha=0.3, label=LABELS["truth"])
-    for track, width in (("single", 1.4), ("cpf", 1.8), ("dcpf", 1.0)):
+    widths: dict[Track, float] = {"single": 1.4, "cpf": 1.8, "dcpf": 1.0}
+    for track, width in widths.items():
         if not group.has(track):
             continue
         deviation = group.paths(track)[:, :, :2] - truth
@@ -78,7 +88,7 @@ def draw_paths(axes: Axes, groups: Sequence[GroupFindings]) -> None:
 
 
 def draw_frames(axes: Axes, groups: Sequence[GroupFindings]) -> None:
-    """The error over the frames: the median over runs and nodes, in a band from the 10th to the 90th per cent."""
+    """The error over the frames: the median over runs and nodes, in a band from 10 to 90 per cent of them."""
     (group,) = groups[:1]
     for track in ("single", "cpf", "dcpf"):
         if not group.has(track):
@@ -93,7 +103,7 @@ def draw_frames(axes: Axes, groups: Sequence[GroupFindings]) -> None:
 
 
 def draw_bytes(axes: Axes, groups: Sequence[GroupFindings]) -> None:
-    """Mean RMSE over the bytes that all cameras send in a frame: DCPF's settings, CPF's ways to send pictures."""
+    """Mean RMSE over the bytes that all cameras send in a frame: DCPF's settings, CPF's codings."""
     sent = [group.bytes_per_frame() for group in groups]
     ours = [mean_interval(group.rmse("dcpf")) for group in groups]
     _draw_line(axes, np.array([each["dcpf"] for each in sent]), ours, _TINTS["dcpf"], _NAMES["dcpf"], "-")
@@ -112,18 +122,24 @@ def draw_bytes(axes: Axes, groups: Sequence[GroupFindings]) -> None:
 
 def draw_time(axes: Axes, groups: Sequence[GroupFindings]) -> None:
     """Mean RMSE over the processor time of a frame: a camera's in DCPF, the central node's in CPF."""
-    n_cameras = [len(group.group.scenario_run.cameras) for group in groups]
-    for track, kind, shares in (("cpf", "central", [1] * len(groups)), ("dcpf", "cameras", n_cameras)):
-        if groups[0].has(track):
-            spent = np.array(
-                [float(np.median(g.cpu_ms(kind))) / share for g, share in zip(groups, shares, strict=True)]
-            )
-            intervals = [mean_interval(group.rmse(track)) for group in groups]
-            where = "central node" if track == "cpf" else "each camera"
-            _draw_line(axes, spent, intervals, _TINTS[track], f"{_NAMES[track]}, {where}", "-")
-            _annotate(axes, groups, spent, intervals)
+    if groups[0].has("cpf"):
+        spent = np.array([np.median(group.cpu_ms("central")) for group in groups])
+        _draw_cost(axes, groups, "cpf", spent, "central node")
+    if groups[0].has("dcpf"):
+        spent = np.array(
+            [np.median(group.cpu_ms("cameras")) / len(group.group.scenario_run.cameras) for group in groups]
+        )
+        _draw_cost(axes, groups, "dcpf", spent, "each camera")
     axes.set(xlabel="processor time a frame / ms", ylabel=_RMSE, xscale="log")
     log_axis(axes)
+
+
+def _draw_cost(
+    axes: Axes, groups: Sequence[GroupFindings], track: Track, spent: Float[np.ndarray, " S"], where: str
+) -> None:
+    intervals = [mean_interval(group.rmse(track)) for group in groups]
+    _draw_line(axes, spent, intervals, _TINTS[track], f"{_NAMES[track]}, {where}", "-")
+    _annotate(axes, groups, spent, intervals)
 
 
 def _draw_cameras(axes: Axes, x: Float[np.ndarray, " S"], groups: Sequence[GroupFindings]) -> None:
@@ -147,7 +163,9 @@ def _draw_line(
 
 def _draw_point(axes: Axes, x: float, interval: Interval, color: str, marker: str, label: str) -> None:
     error = [[interval.value - interval.low], [interval.high - interval.value]]
-    axes.errorbar([x], [interval.value], yerr=error, fmt=marker, color=color, markersize=6, capsize=3, label=label)
+    axes.errorbar(
+        [x], [interval.value], yerr=error, fmt=marker, color=color, markersize=6, capsize=3, label=label
+    )
 
 
 def _annotate(

@@ -1,7 +1,6 @@
 """Many runs: the same whatever the number of jobs, and their figures by hand."""
 
 import pytest
-
 from sim.running.experiment import compare, run_many, run_once
 
 FAST = [("frames", "3"), ("filter.n_particles", "10")]
