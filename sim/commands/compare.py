@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from sim.commands.shared import AsJson, Frames, Overrides, progress_bar, split_overrides
-from sim.experiments.claims import Verdict
+from sim.experiments.found.claims import Verdict
 from sim.experiments.options import ExperimentOptions, StudyOptions, is_experiment, read_experiment
 from sim.experiments.sweeps import parse_sweep
 from sim.running.recorder import RecordingError
@@ -62,12 +62,12 @@ def compare(
     # What computes and draws takes its time to import; --help does not wait for it.
     import joblib
 
-    from sim.experiments.claims import judge
-    from sim.experiments.engine import compute_here, compute_on_cluster
+    from sim.experiments.computing.engine import compute_here, compute_on_cluster
+    from sim.experiments.computing.store import Store
+    from sim.experiments.found.claims import judge
+    from sim.experiments.found.reporting import report, write_files
     from sim.experiments.plan import make_plan
-    from sim.experiments.reporting import report, write_files
     from sim.experiments.run import run_experiment
-    from sim.experiments.store import Store
     from sim.pictures.experiment import write_figures
 
     options, folder, place = _experiment(scenarios, sweeps or [])

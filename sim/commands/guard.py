@@ -11,7 +11,7 @@ from rich.console import Console
 
 from network.errors import NetworkError
 from nodes.sources import SourceError
-from sim.experiments.errors import EngineError
+from sim.experiments.computing.errors import EngineError
 from sim.footage import FootageError
 from sim.running.children import RunFailed
 from sim.running.recorder import RecordingError

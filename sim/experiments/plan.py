@@ -1,4 +1,4 @@
-"""From an experiment to everything that has to be computed: its studies, their groups of runs, their parts."""
+"""From an experiment to everything that has to be computed: its studies, groups of runs, and parts."""
 
 import itertools
 import json
@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from sim.experiments.computing.parts import Kind, Part, cameras_part, central_part
 from sim.experiments.options import ExperimentOptions, StudyOptions
-from sim.experiments.parts import Kind, Part, cameras_part, central_part
 from sim.experiments.sweeps import as_text, require_key, texts
 from sim.scenario.document import Document, read_document
 from sim.scenario.loading import resolve

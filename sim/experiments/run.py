@@ -4,11 +4,11 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import AbstractContextManager, closing
 from typing import Any
 
-from sim.experiments.engine import Result
-from sim.experiments.findings import Findings, GroupFindings
-from sim.experiments.parts import Part
+from sim.experiments.computing.engine import Result
+from sim.experiments.computing.parts import Part
+from sim.experiments.computing.store import Store
+from sim.experiments.found.findings import Findings, GroupFindings
 from sim.experiments.plan import Plan
-from sim.experiments.store import Store
 
 Engine = Callable[[list[Part]], Generator[Result, None, None]]
 ProgressBar = Callable[[int], AbstractContextManager[Callable[[int], None]]]

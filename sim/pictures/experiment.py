@@ -9,7 +9,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.experiments.findings import Findings, GroupFindings
+from sim.experiments.found.findings import Findings, GroupFindings
 from sim.pictures.comparison import plot_comparison
 from sim.pictures.panels import draw_bytes, draw_error, draw_frames, draw_paths, draw_time
 from sim.pictures.plots import cleaned, write_figure

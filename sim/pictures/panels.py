@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 
-from sim.experiments.findings import GroupFindings, Track
+from sim.experiments.found.findings import GroupFindings, Track
 from sim.metrics.intervals import Interval, mean_interval
 from sim.pictures.plots import log_axis
 from sim.pictures.theme import COLORS, LABELS, MUTED

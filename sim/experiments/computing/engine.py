@@ -6,9 +6,9 @@ from typing import Any
 import joblib
 from joblib.externals.loky import get_reusable_executor
 
-from sim.experiments.errors import EngineError
-from sim.experiments.parts import Part, code_version
-from sim.experiments.work import compute
+from sim.experiments.computing.errors import EngineError
+from sim.experiments.computing.parts import Part, code_version
+from sim.experiments.computing.work import compute
 
 Result = tuple[Part, dict[str, Any]]
 

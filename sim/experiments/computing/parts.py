@@ -72,7 +72,7 @@ def code_version() -> str:
     digest = hashlib.sha256()
     for path in sorted(path for package in _PACKAGES for path in (root / package).rglob("*.py")):
         name = path.relative_to(root).as_posix()
-        if not name.startswith(_NO_NUMBERS) or name.endswith(("parts.py", "work.py")):
+        if not name.startswith(_NO_NUMBERS) or name.startswith("sim/experiments/computing"):
             digest.update(f"{name}\0".encode() + path.read_bytes())
     for library in _ARITHMETIC:
         digest.update(f"{library} {version(library)}\0".encode())

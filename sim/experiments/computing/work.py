@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.assembly import Assembly
-from sim.experiments.errors import EngineError
-from sim.experiments.parts import Part, code_version
-from sim.experiments.pictures import CodedSource, KeptSource, kept_pictures
+from sim.experiments.computing.errors import EngineError
+from sim.experiments.computing.parts import Part, code_version
+from sim.experiments.computing.pictures import CodedSource, KeptSource, kept_pictures
 from sim.metrics.consistency import nees
 from sim.running.in_process import run_in_process
 from sim.running.results import Results, Track, summarize

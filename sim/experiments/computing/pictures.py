@@ -1,4 +1,4 @@
-"""The pictures of an experiment's runs: made once for all parts that share them, and sent in other codings."""
+"""The pictures of an experiment: made once for all parts that share them, and sent in other codings."""
 
 import time
 from functools import cached_property, lru_cache

@@ -7,9 +7,9 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.experiments.joining import joined
+from sim.experiments.computing.parts import Kind
+from sim.experiments.found.joining import joined
 from sim.experiments.options import ExperimentOptions
-from sim.experiments.parts import Kind
 from sim.experiments.plan import Group
 from sim.running.metrics import rmse
 
@@ -30,7 +30,7 @@ class GroupFindings:
 
     Attributes:
         group: The group.
-        results: Each run's parts, as `sim.experiments.work.compute` returns them.
+        results: Each run's parts, as `sim.experiments.computing.work.compute` returns them.
     """
 
     group: Group

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from sim.experiments.claims import Verdict, as_data
-from sim.experiments.figures import compare
-from sim.experiments.findings import Findings, GroupFindings, Track
-from sim.experiments.work import as_plain
+from sim.experiments.computing.work import as_plain
+from sim.experiments.found.claims import Verdict, as_data
+from sim.experiments.found.figures import compare
+from sim.experiments.found.findings import Findings, GroupFindings, Track
 from sim.metrics.intervals import mean_interval
 from sim.metrics.sets import gospa, ospa
 from sim.running.metrics import is_lost

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from sim.experiments.findings import Findings, GroupFindings, Track
+from sim.experiments.found.findings import Findings, GroupFindings, Track
 from sim.experiments.options import Claim, FlatClaim, NoisierClaim, WithinClaim
 from sim.metrics.intervals import ratio_interval
 
