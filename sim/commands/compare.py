@@ -76,7 +76,7 @@ def compare(
     given = [*split_overrides(overrides), *([("frames", str(frames))] if frames else [])]
     plan = make_plan(options, folder, given, place)
     results = out or Path("runs") / f"{options.name}-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
-    store = Store(results / "cells")
+    store = Store(results / "parts")
     engine = (
         partial(compute_on_cluster, address=cluster)
         if cluster

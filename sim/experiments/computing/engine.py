@@ -30,7 +30,7 @@ def compute_here(parts: Sequence[Part], n_jobs: int) -> Generator[Result, None, 
         yield from parallel(joblib.delayed(_with_part)(part, code_version()) for part in parts)
     finally:
         # The workers would stay for a while, in case there is more to do.
-        get_reusable_executor().shutdown(wait=True, kill_workers=True)
+        get_reusable_executor().shutdown(wait=True)
 
 
 def compute_on_cluster(parts: Sequence[Part], address: str) -> Generator[Result, None, None]:

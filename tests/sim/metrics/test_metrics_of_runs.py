@@ -89,9 +89,7 @@ def test_the_bound_without_measurements_is_the_models_own_spread():
 
 
 def test_the_bound_of_a_constant_is_the_variance_of_a_mean():
-    (bound,) = posterior_cramer_rao(
-        np.array([[1e12]]), np.eye(1), np.zeros((1, 1)), [np.array([[5 / 0.04]])]
-    )
+    (bound,) = posterior_cramer_rao(np.array([[1e12]]), np.eye(1), np.zeros((1, 1)), [np.array([[5 / 0.04]])])
 
     assert bound == pytest.approx(np.array([[0.04 / 5]]))
 

@@ -84,9 +84,7 @@ def test_nees_is_stonesoups_squared_mahalanobis_distance(n_axes):
 
 
 def library_models():
-    transition = LinearGaussianTimeInvariantTransitionModel(
-        transition_matrix=MOTION.F, covariance_matrix=Q
-    )
+    transition = LinearGaussianTimeInvariantTransitionModel(transition_matrix=MOTION.F, covariance_matrix=Q)
     return transition, LinearGaussian(4, (0, 1), R)
 
 
@@ -189,7 +187,10 @@ def test_our_filter_is_as_good_as_stonesoups_and_neither_beats_the_bound():
     # 30 runs of 15 frames with errors that last a few: the RMSE deviates by some 6% from its mean.
     assert rmse["exact"] == pytest.approx(smallest, rel=0.15)
     # The particles' own noise adds 1/n to the variance, times what resampling costs.
-    off = {name: np.sqrt(((states - exact) ** 2).sum(axis=2).mean()) for name, states in (("mine", mine), ("theirs", theirs))}
+    off = {
+        name: np.sqrt(((states - exact) ** 2).sum(axis=2).mean())
+        for name, states in (("mine", mine), ("theirs", theirs))
+    }
     assert off["mine"] < 0.25 * smallest
     assert off["mine"] == pytest.approx(off["theirs"], rel=0.25)
     assert rmse["mine"] == pytest.approx(rmse["theirs"], rel=0.05)
