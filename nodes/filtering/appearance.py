@@ -1,11 +1,9 @@
-"""What the target looks like to one camera: the reference histograms, the distance to them, their update.
+"""What the target looks like to one camera: the reference histograms and their update.
 
-Sources: Jing & Chen, Eq. 4 (update) and 11 (normalisation); the Bhattacharyya distance d² = 1 - Σ √(h q),
-averaged over the channels, each normalised, and over the parts of the target by their weights.
+Sources: Jing & Chen, Eq. 4 (update) and 11 (normalisation).
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -13,7 +11,6 @@ from pydantic import Field
 
 from network.options import Options
 from nodes.filtering.color import ColorOptions
-from nodes.filtering.histogram import Codebook, codebook
 
 
 class ModelUpdateOptions(Options):
@@ -60,17 +57,6 @@ def normalize_counts(
     return counts.reshape(shape) / np.maximum(pixels, 1)[:, :, None, None]
 
 
-@lru_cache
-def full_codebook(options: ColorOptions) -> Codebook:
-    """A codebook that tells every bin apart."""
-    return codebook(np.ones((len(options.parts), options.n_channels, options.n_bins), bool), options.parts)
-
-
-def reference_codebook(appearance: Appearance, options: ColorOptions) -> Codebook:
-    """A codebook of the bins of the reference that tell the target from its surroundings."""
-    return codebook(appearance.histograms * appearance.distinctness > 0, options.parts)
-
-
 def distinctness_of(
     target: Float[np.ndarray, "P C B"], surroundings: Float[np.ndarray, "P C B"]
 ) -> Float[np.ndarray, "P C B"]:
@@ -87,34 +73,10 @@ def distinctness_of(
     return np.where(target > 0, np.maximum(1 - surroundings / np.maximum(target, 1e-12), 0.0), 0.0)
 
 
-def squared_distances(
-    counts: Int[np.ndarray, "N K"],
-    pixels: Int[np.ndarray, "N P"],
-    appearance: Appearance,
-    book: Codebook,
-    options: ColorOptions,
-) -> Float[np.ndarray, " N"]:
-    """The weighted Bhattacharyya distance of each box to the reference, d² = 1 - Σ ω √(h q) / Σ ω q.
-
-    With ω = 1 it is the plain one, from 0 to 1. Otherwise a box that shows more of the target than the
-    reference's box did is nearer than the reference itself, below 0. Parts of which nothing is in the
-    picture, or in the reference, do not count; a box with none at all has distance 1.
-    """
-    q, omega = appearance.histograms, appearance.distinctness
-    weights = np.array(options.part_weights) / book.n_channels
-    # h = counts / pixels; Σ_p w_p Σ_b ω √(h q)
-    scale = (omega * np.sqrt(q))[book.codes < len(book.part)] * weights[book.part]
-    inverse_root = 1 / np.sqrt(np.maximum(pixels, 1))
-    coefficient = np.einsum("nk,k,nk->n", np.sqrt(counts), scale, inverse_root[:, book.part])
-    # Σ_p w_p Σ_b ω q over the parts that are in the picture
-    perfect = (pixels > 0) @ (weights * (omega * q).sum(axis=(1, 2)))
-    return 1 - np.divide(coefficient, perfect, out=np.zeros_like(perfect), where=perfect > 0)
-
-
 def distance_to(
     histograms: Float[np.ndarray, "P C B"], reference: Appearance, options: ColorOptions
 ) -> float:
-    """The distance d² of `squared_distances`, from normalised histograms."""
+    """The distance d² of `nodes.filtering.pattern`, from normalised histograms."""
     weights = np.array(options.part_weights)[:, None, None] / options.n_channels
     omega, q = reference.distinctness, reference.histograms
     perfect = (weights * omega * q).sum()

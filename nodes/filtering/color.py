@@ -8,10 +8,11 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Integer, UInt8
+from jaxtyping import Float, Int, Integer, UInt8
 from pydantic import Field, model_validator
 
 from network.options import Options
+from nodes.counting.compiled import Coding
 
 GAIN_GRID_PX = 24
 """Every 24th pixel of every 24th line is enough for a median."""
@@ -102,12 +103,27 @@ def quantize(
         Bin indices from 0 to n_bins - 1: the channels red, green, blue in `rgb`; in `joint_rgb`
         r·b² + g·b + b for b bins a channel (Truong & Kim, Eq. 10).
     """
+    tables = _tables(options, gain).astype(np.uint8 if options.n_bins <= 256 else np.uint16)
+    blue, green, red = cv2.split(cv2.LUT(image, np.ascontiguousarray(tables.T)[None]))
+    return np.stack([red, green, blue]) if options.space == "rgb" else (red + green + blue)[None]
+
+
+def _tables(options: ColorOptions, gain: Float[np.ndarray, " 3"]) -> Int[np.ndarray, "3 256"]:
+    """The bin of each value of blue, green and red; in `joint_rgb` what each adds to the joint bin."""
     n = options.bins_per_channel
     # bin = floor(n · value / 256), of the value without its gain
-    values = _VALUES / gain[:, None]
-    dtype = np.uint8 if options.n_bins <= 256 else np.uint16
-    bins = np.minimum(values * n / 256, n - 1).astype(dtype)
-    if options.space == "joint_rgb":
-        bins *= np.array([[1], [n], [n * n]], dtype)
-    blue, green, red = cv2.split(cv2.LUT(image, np.ascontiguousarray(bins.T)[None]))
-    return np.stack([red, green, blue]) if options.space == "rgb" else (red + green + blue)[None]
+    bins = np.minimum(_VALUES * (n / 256) / gain[:, None], n - 1).astype(np.intp)
+    return bins if options.space == "rgb" else bins * _digits(n)
+
+
+def _digits(n: int) -> Int[np.ndarray, "3 1"]:
+    """What blue, green and red count for in a number of three digits to the base n."""
+    return np.array([[1], [n], [n * n]])
+
+
+def coding(options: ColorOptions, gain: Float[np.ndarray, " 3"]) -> Coding:
+    """The joint index of a pixel for the compiled kernel: its digits are the bins of red, green and blue."""
+    tables = _tables(options, gain)
+    if options.space == "rgb":
+        tables = tables * _digits(options.bins_per_channel)
+    return Coding(tables.astype(np.uint16))

@@ -6,25 +6,33 @@ camera and one picture lives here; nothing about particles' weights does.
 
 import math
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from network.options import Options
 from nodes.camera import Camera
+from nodes.counting.codebook import Codebook
+from nodes.counting.compiled import count_compiled, marks_of
+from nodes.counting.histogram import SamplingOptions, count
 from nodes.filtering.appearance import (
     Appearance,
     ModelUpdateOptions,
     distinctness_of,
-    full_codebook,
     normalize_counts,
-    reference_codebook,
-    squared_distances,
     update_appearance,
 )
-from nodes.filtering.color import ColorOptions, GainReference, channel_gain, gain_reference, quantize
-from nodes.filtering.histogram import Codebook, SamplingOptions, count
+from nodes.filtering.color import (
+    ColorOptions,
+    GainReference,
+    channel_gain,
+    coding,
+    gain_reference,
+    quantize,
+)
 from nodes.filtering.likelihood import LikelihoodOptions, background_constants, log_likelihoods
+from nodes.filtering.pattern import coefficients, full_codebook, pattern_of, squared_distances
 from nodes.filtering.target import TargetOptions, project_boxes, visible_fraction
 
 GOOD_SIGHT = 0.9
@@ -34,6 +42,9 @@ GOOD_SIGHT = 0.9
 class ObservationOptions(Options):
     """How a camera measures the target."""
 
+    backend: Literal["fast", "compiled"] = "fast"
+    """What counts the colours of the particles' boxes: `fast`, NumPy and OpenCV; `compiled`, a kernel in C
+    that is built on first use. The counts are equal to the last one."""
     color: ColorOptions = ColorOptions()
     sampling: SamplingOptions = SamplingOptions()
     likelihood: LikelihoodOptions = LikelihoodOptions()
@@ -116,9 +127,9 @@ class ObservationModel:
         """What the target's box at a position shows."""
         boxes = project_boxes(position[None], self.target, self.camera)
         visible = visible_fraction(boxes, self.camera)
-        book = full_codebook(self.options.color)
-        counts, pixels = self._count(picture, boxes, visible, book)
-        distance = squared_distances(counts, pixels, appearance, book, self.options.color)
+        pattern = pattern_of(appearance, self.options.color, all_bins=True)
+        counts, pixels = self._count(picture, boxes, visible, pattern.book)
+        distance = squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
         histograms = normalize_counts(counts, pixels, self.options.color)[0]
         return Sight(histograms, float(distance[0]), float(visible[0]))
 
@@ -172,9 +183,22 @@ class ObservationModel:
         self, picture: Picture, boxes: Float[np.ndarray, "N 4"], appearance: Appearance
     ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
         visible = visible_fraction(boxes, self.camera)
-        book = reference_codebook(appearance, self.options.color)
-        counts, pixels = self._count(picture, boxes, visible, book)
-        return squared_distances(counts, pixels, appearance, book, self.options.color), visible
+        pattern = pattern_of(appearance, self.options.color)
+        if self.options.backend == "compiled":
+            sampling = self.options.sampling
+            _, pixels, coefficient = count_compiled(
+                picture.image,
+                coding(self.options.color, picture.gain),
+                boxes,
+                marks_of(pattern.book),
+                pattern.scale,
+                sampling.grid,
+                sampling.kernel,
+            )
+        else:
+            counts, pixels = self._count(picture, boxes, visible, pattern.book)
+            coefficient = coefficients(counts, pixels, pattern)
+        return squared_distances(coefficient, pixels, pattern), visible
 
     def _histograms(self, picture: Picture, boxes: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N P C B"]:
         color, visible = self.options.color, visible_fraction(boxes, self.camera)

@@ -13,17 +13,14 @@ from nodes.filtering.appearance import (
     ModelUpdateOptions,
     distance_to,
     distinctness_of,
-    full_codebook,
     normalize_counts,
     pack_looks,
-    reference_codebook,
     settled,
-    squared_distances,
     unpack_looks,
     update_appearance,
 )
 from nodes.filtering.color import ColorOptions
-from nodes.filtering.histogram import codebook
+from nodes.filtering.pattern import coefficients, pattern_of, squared_distances
 
 JOINT = ColorOptions(space="joint_rgb", bins_per_channel=2)
 RGB = ColorOptions(bins_per_channel=4)
@@ -46,10 +43,15 @@ def appearance_of(histograms, **changes):
 def distances(counts, reference, options, n_pixels=50, distinctness=1.0):
     """d² by way of the bins that the reference holds only."""
     appearance = appearance_of(reference, distinctness=distinctness * np.ones_like(reference))
-    book = reference_codebook(appearance, options)
-    pixels = np.full((len(counts), len(options.parts)), n_pixels)
     used = reference * appearance.distinctness > 0
-    return squared_distances(counts[:, used], pixels, appearance, book, options)
+    return distances_of(
+        counts[:, used], np.full((len(counts), len(options.parts)), n_pixels), appearance, options
+    )
+
+
+def distances_of(counts, pixels, appearance, options):
+    pattern = pattern_of(appearance, options)
+    return squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
 
 
 @given(seeds)
@@ -110,25 +112,22 @@ def test_more_of_the_target_than_in_the_reference_is_nearer_than_the_reference()
     reference = np.array([[[0.6, 0.4, 0, 0]]])  # four tenths of its box show the floor
     omega = np.array([[[1.0, 0, 1, 1]]])
     boxes = np.array([[[[60, 40, 0, 0]]], [[[90, 10, 0, 0]]], [[[30, 70, 0, 0]]]])
-    counts, book = boxes[:, reference * omega > 0], codebook(reference * omega > 0, (1.0,))
-    found = squared_distances(
-        counts, np.full((3, 1), 100), appearance_of(reference, distinctness=omega), book, JOINT
-    )
+    counts = boxes[:, reference * omega > 0]
+    found = distances_of(counts, np.full((3, 1), 100), appearance_of(reference, distinctness=omega), JOINT)
     np.testing.assert_allclose(found, 1 - np.sqrt([1, 1.5, 0.5]), atol=1e-12)
 
 
 def test_parts_outside_the_picture_do_not_count():
     rng = np.random.default_rng(0)
     counts, reference = random_counts(rng, PARTS, 1), random_counts(rng, PARTS, 1)[0] / 50
-    book = full_codebook(PARTS)
     reference = np.maximum(reference, 1e-9)  # every bin is told apart
-    codes = counts.reshape(1, -1)
-    torso_only = codes * (book.part == 1)
     appearance = appearance_of(reference)
-    found = squared_distances(torso_only, np.array([[0, 50]]), appearance, book, PARTS)
+    codes = counts.reshape(1, -1)
+    torso_only = codes * (pattern_of(appearance, PARTS).book.part == 1)
+    found = distances_of(torso_only, np.array([[0, 50]]), appearance, PARTS)
     similarity = np.sqrt(counts[0, 1] / 50 * reference[1]).sum(axis=-1) / reference[1].sum(axis=-1)
     assert found[0] == pytest.approx(1 - similarity.mean(), abs=1e-6)
-    nothing = squared_distances(0 * codes, np.array([[0, 0]]), appearance, book, PARTS)
+    nothing = distances_of(0 * codes, np.array([[0, 0]]), appearance, PARTS)
     assert nothing[0] == 1
 
 

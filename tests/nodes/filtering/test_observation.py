@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from nodes.camera import look_at
+from nodes.counting.histogram import SamplingOptions
 from nodes.filtering.appearance import ModelUpdateOptions
 from nodes.filtering.color import ColorOptions
-from nodes.filtering.histogram import SamplingOptions
 from nodes.filtering.observation import (
     ObservationModel,
     ObservationOptions,

@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from nodes.filtering.histogram import SamplingOptions, codebook, count, sample_positions
+from nodes.counting.codebook import codebook
+from nodes.counting.grid import sample_positions
+from nodes.counting.histogram import SamplingOptions, count
 
 HEIGHT, WIDTH = 30, 40
 PARTS = (0.2, 0.5, 0.3)
