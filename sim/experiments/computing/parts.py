@@ -8,9 +8,11 @@ import hashlib
 import json
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
+
+import cv2
+import numpy as np
 
 import sim
 from network.weights import MetropolisWeights
@@ -20,8 +22,8 @@ Kind = Literal["cameras", "central", "coded"]
 """The cameras with their network; the central node on raw pictures; the same on pictures sent as JPEG."""
 
 _PACKAGES = ("network", "nodes", "sim")
+_SOURCES = {".py", ".c"}
 _NO_NUMBERS = ("sim/commands", "sim/pictures", "sim/experiments")
-_ARITHMETIC = ("numpy", "opencv-python-headless")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,12 +72,12 @@ def code_version() -> str:
     """A hash of everything that numbers come from: this program's source, and what it calculates with."""
     root = Path(sim.__file__).parents[1]
     digest = hashlib.sha256()
-    for path in sorted(path for package in _PACKAGES for path in (root / package).rglob("*.py")):
+    sources = [path for package in _PACKAGES for path in (root / package).rglob("*.*")]
+    for path in sorted(path for path in sources if path.suffix in _SOURCES):
         name = path.relative_to(root).as_posix()
         if not name.startswith(_NO_NUMBERS) or name.startswith("sim/experiments/computing"):
             digest.update(f"{name}\0".encode() + path.read_bytes())
-    for library in _ARITHMETIC:
-        digest.update(f"{library} {version(library)}\0".encode())
+    digest.update(f"numpy {np.__version__}, opencv {cv2.__version__}".encode())
     return digest.hexdigest()
 
 

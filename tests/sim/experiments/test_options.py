@@ -8,13 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sim.commands.inspect import experiment_schema
 from sim.experiments.options import is_experiment, read_experiment
 from sim.experiments.plan import make_plan
 from sim.experiments.sweeps import parse_sweep, parse_values
 from sim.scenario.document import read_document
 from sim.scenario.parsing import ScenarioError
 
-SHIPPED = sorted((Path(__file__).parents[3] / "scenarios/experiments").glob("*.yaml"))
+FOLDER = Path(__file__).parents[3] / "scenarios/experiments"
+SHIPPED = [path for path in sorted(FOLDER.glob("*.yaml")) if is_experiment(read_document(path))]
 
 
 @pytest.mark.parametrize(
@@ -72,7 +74,8 @@ HEAD = "name: e\nscenarios: [small.yaml]\nstudies:\n  a: "
         (HEAD + "{plot: pie}", r"e\.yaml:4:7: studies\.a\.plot must be 'error', 'paths'"),
         (HEAD + "{}", "the plot error is over a swept key"),
         (HEAD + "{plot: paths, sweep: {frames: '3:4'}}", "the plot paths shows one setting"),
-        (HEAD + "{plot: strips, claims: [{kind: flat}]}", "the claim flat needs 1 swept keys and the estimators"),
+        (HEAD + "{plot: strips, claims: [{kind: flat}]}",
+         "the claim flat needs 1 swept keys and the estimators"),
         (HEAD + "{sweep: {frames: '3'}, claims: [{kind: flt}]}", r"claims\[0\]\.kind must be one of"),
         (HEAD + "{plot: strips}\npage: [b]", "page names b, which is no study: take some of a"),
         ("name: e\nscenarios: []\nstudies: {a: {plot: strips}}", "scenarios"),
@@ -128,11 +131,14 @@ def test_a_plan_has_every_combination_once(tmp_path, small):
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_shipped_experiments_are_planned(path):
-    document = read_document(path)
-
-    assert is_experiment(document)
-    plan = plan_of(document, path.parent)
+    plan = plan_of(read_document(path), path.parent)
 
     assert plan.options.name == path.stem
     assert {group.study for group in plan.groups} == set(plan.options.studies)
     assert json.dumps(plan.options.model_dump(mode="json"))
+
+
+def test_the_committed_schema_is_the_models():
+    committed = FOLDER / "experiment.schema.json"
+
+    assert json.loads(committed.read_text(encoding="utf-8")) == experiment_schema()
