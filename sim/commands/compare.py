@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import partial
 from itertools import groupby
@@ -15,7 +15,8 @@ from rich.table import Table
 
 from sim.commands.shared import AsJson, Frames, Overrides, progress_bar, split_overrides
 from sim.experiments.found.claims import Verdict
-from sim.experiments.options import ExperimentOptions, StudyOptions, is_experiment, read_experiment
+from sim.experiments.options import ExperimentOptions, StudyOptions, is_experiment
+from sim.experiments.plan import Plan, make_plan, plan_experiment
 from sim.experiments.sweeps import parse_sweep
 from sim.running.recorder import RecordingError
 from sim.scenario.document import read_document
@@ -66,16 +67,12 @@ def compare(
     from sim.experiments.computing.store import Store
     from sim.experiments.found.claims import judge
     from sim.experiments.found.reporting import report, write_files
-    from sim.experiments.plan import make_plan
     from sim.experiments.run import run_experiment
     from sim.pictures.experiment import write_figures
 
-    options, folder, place = _experiment(scenarios, sweeps or [])
-    if runs is not None:
-        options = options.model_copy(update={"runs": runs})
     given = [*split_overrides(overrides), *([("frames", str(frames))] if frames else [])]
-    plan = make_plan(options, folder, given, place)
-    results = out or Path("runs") / f"{options.name}-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
+    plan = _plan(scenarios, sweeps or [], given, runs)
+    results = out or Path("runs") / f"{plan.options.name}-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
     store = Store(results / "parts")
     engine = (
         partial(compute_on_cluster, address=cluster)
@@ -98,30 +95,24 @@ def compare(
         _print({label: each for label, each in found.items() if label != "claims"}, verdicts, results)
 
 
-def _experiment(
-    paths: list[Path], sweeps: list[str]
-) -> tuple[ExperimentOptions, Path, Callable[[str, str], str]]:
-    """The experiment, the folder of its scenarios, and where its swept keys were written."""
-    documents = [document for document in map(read_document, paths) if is_experiment(document)]
-    if documents:
-        document, *_ = documents
+def _plan(paths: list[Path], sweeps: list[str], given: list[tuple[str, str]], runs: int | None) -> Plan:
+    """What to compute: the experiment of a file, or one study over the scenarios and sweeps."""
+    experiments = [document for document in map(read_document, paths) if is_experiment(document)]
+    if experiments:
+        document, *_ = experiments
         if len(paths) > 1:
             raise ScenarioError(f"{document.path}: is an experiment: give it alone, or scenarios only")
         if sweeps:
             raise ScenarioError(f"{document.path}: is an experiment with sweeps of its own: take --sweep out")
-        return (
-            read_experiment(document),
-            document.path.parent,
-            lambda study, key: document.place(("studies", study, "sweep", key)),
-        )
+        return plan_experiment(document, given, runs)
     chosen = {sweep.key: sweep.values for sweep in map(parse_sweep, sweeps)}
     if len(chosen) < len(sweeps):
         raise ScenarioError("--sweep: a key is swept twice: give its values in one list")
     study = StudyOptions(plot="error" if chosen else "strips", sweep=chosen)
     options = ExperimentOptions(
-        name="compare", scenarios=tuple(map(str, paths)), studies={"comparison": study}
+        name="compare", runs=runs or 10, scenarios=tuple(map(str, paths)), studies={"comparison": study}
     )
-    return options, Path(), lambda _, key: f"--sweep {key}"
+    return make_plan(options, Path(), given, lambda _, key: f"--sweep {key}")
 
 
 def _print(found: dict[str, Any], verdicts: Sequence[Verdict], folder: Path) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sim.experiments.computing.parts import Kind, Part, cameras_part, central_part
-from sim.experiments.options import ExperimentOptions, StudyOptions
+from sim.experiments.options import ExperimentOptions, StudyOptions, read_experiment
 from sim.experiments.sweeps import as_text, require_key, texts
 from sim.scenario.document import Document, read_document
 from sim.scenario.loading import resolve
@@ -62,6 +62,28 @@ class Plan:
         for part in parts.values():
             alike.setdefault(part.pictures, []).append(part)
         return list(itertools.chain.from_iterable(alike.values()))
+
+
+def plan_experiment(document: Document, overrides: Sequence[Setting] = (), runs: int | None = None) -> Plan:
+    """Resolves an experiment file.
+
+    Args:
+        document: The file.
+        overrides: Keys and values set in all scenarios, over what the experiment sets.
+        runs: Seeds of each setting, in place of the file's.
+
+    Raises:
+        ScenarioError: It, a scenario, key or value is not as it must be.
+    """
+    options = read_experiment(document)
+    if runs is not None:
+        options = options.model_copy(update={"runs": runs})
+    return make_plan(
+        options,
+        document.path.parent,
+        overrides,
+        lambda *at: document.place(("studies", at[0], "sweep", at[1])),
+    )
 
 
 def make_plan(

@@ -1,7 +1,7 @@
 """Runs an experiment: what is on disk is read, the rest is computed and kept."""
 
-from collections.abc import Callable, Generator, Mapping
-from contextlib import AbstractContextManager, closing
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import AbstractContextManager, closing, contextmanager
 from typing import Any
 
 from sim.experiments.computing.engine import Result
@@ -14,7 +14,14 @@ Engine = Callable[[list[Part]], Generator[Result, None, None]]
 ProgressBar = Callable[[int], AbstractContextManager[Callable[[int], None]]]
 
 
-def run_experiment(plan: Plan, store: Store, engine: Engine, progress: ProgressBar) -> Findings:
+@contextmanager
+def _without_progress(_total: int) -> Iterator[Callable[[int], None]]:
+    yield lambda _done: None
+
+
+def run_experiment(
+    plan: Plan, store: Store, engine: Engine, progress: ProgressBar = _without_progress
+) -> Findings:
     """Runs an experiment.
 
     Args:

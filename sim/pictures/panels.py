@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from sim.experiments.found.findings import GroupFindings, Track
 from sim.metrics.intervals import Interval, mean_interval
@@ -36,6 +37,7 @@ _TINTS: dict[Track, str] = {
     "single": COLORS["single"],
     "coded": "#56B4E9",
 }
+_MOST_TICKS = 9
 _DASHES = ("-", "--", ":", "-.")
 _RMSE = "RMSE of the position / m"
 
@@ -58,8 +60,9 @@ def draw_error(axes: Axes, groups: Sequence[GroupFindings]) -> None:
             if line[0].has(track):
                 intervals = [mean_interval(group.rmse(track)) for group in line]
                 _draw_line(axes, numbers, intervals, _TINTS[track], _NAMES[track] + label, dash)
-    if not is_number:
+    if not is_number or len(values) <= _MOST_TICKS:
         axes.set_xticks(numbers, values)
+    if not is_number:
         axes.set_xlim(-0.5, len(values) - 0.5)
     axes.set(xlabel=AXES.get(key, key), ylabel=_RMSE)
     log_axis(axes)
@@ -80,7 +83,7 @@ def draw_paths(axes: Axes, groups: Sequence[GroupFindings]) -> None:
             continue
         deviation = group.paths(track)[:, :, :2] - truth
         for run in deviation:
-            axes.plot(*(middle + run).T, color=_TINTS[track], linewidth=0.4, alpha=0.35)
+            axes.plot(*(middle + run).T, color=_TINTS[track], linewidth=0.5, alpha=0.5)
         mean = middle + np.ma.masked_invalid(deviation).mean(axis=0).filled(np.nan)
         axes.plot(*mean.T, color=_TINTS[track], linewidth=width, label=_NAMES[track])
     axes.set(xlabel="x / m", ylabel="y / m")
@@ -98,7 +101,8 @@ def draw_frames(axes: Axes, groups: Sequence[GroupFindings]) -> None:
         frames = np.arange(1, errors.shape[2] + 1)
         axes.plot(frames, median, color=_TINTS[track], linewidth=1.6, label=_NAMES[track])
         axes.fill_between(frames, low, high, color=_TINTS[track], alpha=0.2, linewidth=0)
-    axes.set(xlabel="frame", ylabel="position error / m")
+    axes.set(xlabel="frame", ylabel="position error / m", xlim=(0, group.truth().shape[1] - 1))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     log_axis(axes)
 
 
@@ -106,8 +110,9 @@ def draw_bytes(axes: Axes, groups: Sequence[GroupFindings]) -> None:
     """Mean RMSE over the bytes that all cameras send in a frame: DCPF's settings, CPF's codings."""
     sent = [group.bytes_per_frame() for group in groups]
     ours = [mean_interval(group.rmse("dcpf")) for group in groups]
-    _draw_line(axes, np.array([each["dcpf"] for each in sent]), ours, _TINTS["dcpf"], _NAMES["dcpf"], "-")
-    _annotate(axes, groups, np.array([each["dcpf"] for each in sent]), ours)
+    x = np.array([each["dcpf"] for each in sent])
+    _draw_points(axes, x, ours, _TINTS["dcpf"], "-o", _NAMES["dcpf"])
+    _annotate(axes, groups, x, ours)
     raw = mean_interval(groups[0].rmse("cpf"))
     points = [("cpf", raw, "o", "CPF, raw pictures"), ("bins", raw, "s", "CPF, bin indices as PNG")]
     if groups[0].has("coded"):
@@ -115,8 +120,9 @@ def draw_bytes(axes: Axes, groups: Sequence[GroupFindings]) -> None:
     for name, interval, marker, label in points:
         if name in sent[0]:
             color = _TINTS["coded" if name == "jpeg" else "cpf"]
-            _draw_point(axes, sent[0][name], interval, color, marker, label)
+            _draw_points(axes, np.array([sent[0][name]]), [interval], color, marker, label)
     axes.set(xlabel="bytes a frame, all cameras", ylabel=_RMSE, xscale="log")
+    axes.margins(x=0.12)
     log_axis(axes)
 
 
@@ -130,7 +136,9 @@ def draw_time(axes: Axes, groups: Sequence[GroupFindings]) -> None:
             [np.median(group.cpu_ms("cameras")) / len(group.group.scenario_run.cameras) for group in groups]
         )
         _draw_cost(axes, groups, "dcpf", spent, "each camera")
-    axes.set(xlabel="processor time a frame / ms", ylabel=_RMSE, xscale="log")
+    axes.set(xlabel="processor time a frame / ms", ylabel=_RMSE)
+    axes.margins(x=0.12)
+    axes.set_xlim(left=0)
     log_axis(axes)
 
 
@@ -138,7 +146,7 @@ def _draw_cost(
     axes: Axes, groups: Sequence[GroupFindings], track: Track, spent: Float[np.ndarray, " S"], where: str
 ) -> None:
     intervals = [mean_interval(group.rmse(track)) for group in groups]
-    _draw_line(axes, spent, intervals, _TINTS[track], f"{_NAMES[track]}, {where}", "-")
+    _draw_points(axes, spent, intervals, _TINTS[track], "-o", f"{_NAMES[track]}, {where}")
     _annotate(axes, groups, spent, intervals)
 
 
@@ -161,11 +169,15 @@ def _draw_line(
     axes.fill_between(x, low, high, color=color, alpha=0.15, linewidth=0)
 
 
-def _draw_point(axes: Axes, x: float, interval: Interval, color: str, marker: str, label: str) -> None:
-    error = [[interval.value - interval.low], [interval.high - interval.value]]
+def _draw_points(
+    axes: Axes, x: Float[np.ndarray, " S"], intervals: Sequence[Interval], color: str, style: str, label: str
+) -> None:
+    """Points with bars of 95% confidence."""
+    value, low, high = np.array([[each.value, each.low, each.high] for each in intervals]).T
     axes.errorbar(
-        [x], [interval.value], yerr=error, fmt=marker, color=color, markersize=6, capsize=3, label=label
-    )
+        x, value, yerr=[value - low, high - value], fmt=style, color=color, markersize=5, linewidth=1.6,
+        elinewidth=0.8, capsize=2, label=label,
+    )  # fmt: skip
 
 
 def _annotate(

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from sim.commands.inspect import experiment_schema
 from sim.experiments.options import is_experiment, read_experiment
-from sim.experiments.plan import make_plan
+from sim.experiments.plan import plan_experiment
 from sim.experiments.sweeps import parse_sweep, parse_values
 from sim.scenario.document import read_document
 from sim.scenario.parsing import ScenarioError
@@ -86,14 +86,15 @@ def test_a_wrong_experiment_is_told_with_its_place(tmp_path, text, sentence):
         read(tmp_path, text)
 
 
-def test_a_wrong_key_of_a_sweep_is_told_with_its_place(tmp_path, small):
+@pytest.mark.usefixtures("small")
+def test_a_wrong_key_of_a_sweep_is_told_with_its_place(tmp_path):
     text = HEAD + "{sweep: {filter.alpha: '0:1'}}"
     document = read_document_of(tmp_path, text)
 
     with pytest.raises(
         ScenarioError, match=r"e\.yaml:4:15: filter\.alpha is not a key of the scenario: did you"
     ):
-        plan_of(document, small.parent)
+        plan_experiment(document)
 
 
 def read_document_of(tmp_path, text):
@@ -102,17 +103,13 @@ def read_document_of(tmp_path, text):
     return read_document(path)
 
 
-def plan_of(document, folder, *overrides):
-    place = lambda study, key: document.place(("studies", study, "sweep", key))  # noqa: E731
-    return make_plan(read_experiment(document), folder, overrides, place)
-
-
-def test_a_plan_has_every_combination_once(tmp_path, small):
+@pytest.mark.usefixtures("small")
+def test_a_plan_has_every_combination_once(tmp_path):
     text = (
         HEAD + "{sweep: {network.iterations: '1:3', cameras: [2, 4]}}\nruns: 2\nset: {filter.n_particles: 10}"
     )
 
-    plan = plan_of(read_document_of(tmp_path, text), small.parent, ("frames", "3"))
+    plan = plan_experiment(read_document_of(tmp_path, text), [("frames", "3")])
 
     assert len(plan.groups) == 6
     assert all(group.seeds == (0, 1) for group in plan.groups)
@@ -131,7 +128,7 @@ def test_a_plan_has_every_combination_once(tmp_path, small):
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_shipped_experiments_are_planned(path):
-    plan = plan_of(read_document(path), path.parent)
+    plan = plan_experiment(read_document(path))
 
     assert plan.options.name == path.stem
     assert {group.study for group in plan.groups} == set(plan.options.studies)
