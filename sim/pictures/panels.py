@@ -122,7 +122,6 @@ def draw_bytes(axes: Axes, groups: Sequence[GroupFindings]) -> None:
             color = _TINTS["coded" if name == "jpeg" else "cpf"]
             _draw_points(axes, np.array([sent[0][name]]), [interval], color, marker, label)
     axes.set(xlabel="bytes a frame, all cameras", ylabel=_RMSE, xscale="log")
-    axes.margins(x=0.12)
     log_axis(axes)
 
 
@@ -137,9 +136,8 @@ def draw_time(axes: Axes, groups: Sequence[GroupFindings]) -> None:
         )
         _draw_cost(axes, groups, "dcpf", spent, "each camera")
     axes.set(xlabel="processor time a frame / ms", ylabel=_RMSE)
-    axes.margins(x=0.12)
-    axes.set_xlim(left=0)
     log_axis(axes)
+    axes.set_xlim(left=0)
 
 
 def _draw_cost(
@@ -183,13 +181,17 @@ def _draw_points(
 def _annotate(
     axes: Axes, groups: Sequence[GroupFindings], x: Float[np.ndarray, " S"], intervals: Sequence[Interval]
 ) -> None:
-    """The values of the swept key beside the first and the last point of a line."""
-    for index in (0, -1):
+    """The value of the swept key below the first point's bar, and above the last one's."""
+    for index, end, offset, align in (
+        (0, intervals[0].low, -4, "top"),
+        (-1, intervals[-1].high, 4, "bottom"),
+    ):
         name, value = groups[index].group.settings[0]
         axes.annotate(
-            f"{_short(name)} = {value}", (x[index], intervals[index].value), xytext=(0, 7),
-            textcoords="offset points", ha="center", color=MUTED, size=8,
+            f"{_short(name)} = {value}", (x[index], end), xytext=(0, offset), textcoords="offset points",
+            ha="center", va=align, color=MUTED, size=8,
         )  # fmt: skip
+    axes.margins(x=0.12, y=0.12)
 
 
 def _numbers(values: Sequence[str]) -> tuple[Float[np.ndarray, " S"], bool]:
