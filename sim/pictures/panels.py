@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from sim.experiments.found.findings import GroupFindings, Track
 from sim.metrics.intervals import Interval, mean_interval
 from sim.pictures.plots import log_axis
-from sim.pictures.theme import COLORS, LABELS, MUTED
+from sim.pictures.theme import COLORS, LABELS, MUTED, PAPER
 
 AXES = {
     "filter.model_update.alpha": "model update α (Eq. 4)",
@@ -189,7 +189,8 @@ def _annotate(
         name, value = groups[index].group.settings[0]
         axes.annotate(
             f"{_short(name)} = {value}", (x[index], end), xytext=(0, offset), textcoords="offset points",
-            ha="center", va=align, color=MUTED, size=8,
+            ha="center", va=align, color=MUTED, size=8, zorder=5,
+            bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5, "alpha": 0.85},
         )  # fmt: skip
     axes.margins(x=0.12, y=0.12)
 
