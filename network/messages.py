@@ -96,7 +96,10 @@ class EstimateMessage:
         estimator: Which filter.
         frame: Frame of the run.
         time_s: Its time, seconds from frame 0.
-        mean: State [x, y, vx, vy], or [x, y, z, vx, vy, vz] in a volume; metres and metres a second.
+        mean: State [x, y, vx, vy], or [x, y, z, vx, vy, vz] in a volume; metres and metres a second. Of one
+            camera that tracks in its image plane, pixels and pixels a second, (0, 0) being the middle of the
+            top left one. Under autoregressive dynamics the position of the frame before stands in the
+            velocity's place.
         covariance: Of the state.
         visible: Whether somebody sees the target.
         lost: Whether the filter takes the target for lost.
@@ -192,7 +195,7 @@ class TruthMessage:
         run: Name of the run.
         frame: Frame of the run.
         time_s: Its time, seconds from frame 0.
-        mean: State as in the estimates; metres and metres a second.
+        mean: State as in the estimates.
         visibility: What each camera sees of the target.
     """
 

@@ -10,7 +10,7 @@ from network.options import Options
 from network.streams import stream
 from nodes.filtering.fusion import FusionOptions
 from nodes.filtering.gaussian import Moments
-from nodes.filtering.motion import DynamicsOptions, MotionModel, constant_velocity
+from nodes.filtering.motion import DynamicsOptions, MotionModel, motion_model
 from nodes.filtering.observation import ObservationOptions
 from nodes.filtering.particles import Particles, sample_gaussian
 from nodes.filtering.target import TargetOptions
@@ -75,7 +75,7 @@ class TrackingSetup:
     @property
     def motion(self) -> MotionModel:
         """The state model at the run's frame rate."""
-        return constant_velocity(self.target.n_axes, 1 / self.rate_hz, self.filter.dynamics)
+        return motion_model(self.target.n_axes, 1 / self.rate_hz, self.filter.dynamics)
 
     def stream(self, *names: str) -> np.random.Generator:
         """The random stream of a filter, by its node's and its own name."""

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -19,10 +18,10 @@ from nodes.filtering.observation import ObservationModel
 from nodes.setup import Start, TrackingSetup
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
-from sim.footage.ground_truth import read_ground_truth
 from sim.scenario.loading import cameras_of, video_source
 from sim.scenario.model import Scenario
 from sim.scenario.parsing import ScenarioError
+from sim.truth import measured_truth, rendered_truth
 from sim.world.renderer import Renderer
 from sim.world.visibility import visibility
 from sim.world.world import World, build_world
@@ -85,50 +84,46 @@ class Assembly:
         Raises:
             ScenarioError: The ground truth is shorter than the run.
         """
-        n_axes, times = self.scenario.target.n_axes, np.arange(self.scenario.frames) / self.scenario.rate_hz
+        scenario = self.scenario
+        target, dynamics = scenario.target, scenario.filter.dynamics
         if self.world is not None:
-            person = str(self.scenario.target.person)
-            states = [np.r_[self.world.position(person, t), self.world.velocity(person, t)] for t in times]
-            return np.array(states) if n_axes == 2 else self._in_volume(np.array(states))
-        footage = self.scenario.footage
-        if footage is None or footage.ground_truth is None:
+            times = np.arange(scenario.frames) / scenario.rate_hz
+            camera = next(iter(self.cameras.values()))
+            return rendered_truth(self.world, target, camera, times, dynamics)
+        if scenario.footage is None:
             return None
-        path = Path(footage.ground_truth)
-        positions = read_ground_truth(path)[footage.first_frame :, :n_axes]
-        if len(positions) < self.scenario.frames:
-            raise ScenarioError(
-                f"{path}: has {len(positions)} frames from first_frame on, the run {self.scenario.frames}:"
-                " take fewer frames"
-            )
-        positions = positions[: self.scenario.frames]
-        velocities = np.gradient(positions, 1 / self.scenario.rate_hz, axis=0)
-        return np.hstack([positions, velocities])
-
-    def _in_volume(self, states: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "T 6"]:
-        """A walking person as a target in a volume: the middle of the body."""
-        half = np.full(len(states), self.scenario.target.height / 2)
-        x, y, vx, vy = states.T
-        return np.stack([x, y, half, vx, vy, np.zeros_like(half)], axis=1)
+        return measured_truth(scenario.footage, target, scenario.frames, scenario.rate_hz, dynamics)
 
     @cached_property
     def start(self) -> Start:
         """What every filter is told about the target at frame 0.
 
         Raises:
-            ScenarioError: It should be the truth, and there is none.
+            ScenarioError: It should be the truth, and there is none, or the camera cannot picture it.
         """
-        options, n_axes = self.scenario.target.start, self.scenario.target.n_axes
+        scenario = self.scenario
+        options, n_axes = scenario.target.start, scenario.target.n_axes
         if options.position == "truth":
             if self.truth is None:
                 raise ScenarioError(
                     "target.start.position is truth, but the footage has no ground_truth: give the position"
                 )
             position = self.truth[0, :n_axes]
+            if not np.isfinite(position).all():
+                raise ScenarioError(
+                    f"target.start.position is truth, but camera {scenario.cameras[0].name} has"
+                    f" {scenario.target.subject} behind it at frame 0: turn it, or begin the path in its view"
+                )
         else:
             position = np.array(options.position)
-        error = options.position_error * stream(self.scenario.seed, "start").standard_normal(n_axes)
+        error = options.position_error * stream(scenario.seed, "start").standard_normal(n_axes)
+        position, velocity = position + error, np.array(options.velocity)
+        if scenario.filter.dynamics.model == "autoregressive":
+            # [x(0), x(-1)]: both known as well
+            before = position - velocity / scenario.rate_hz
+            return Start(np.r_[position, before], np.full(2 * n_axes, options.position_deviation))
         deviations = np.repeat([options.position_deviation, options.velocity_deviation], n_axes)
-        return Start(np.r_[position + error, options.velocity], deviations)
+        return Start(np.r_[position, velocity], deviations)
 
     @cached_property
     def setup(self) -> TrackingSetup:
@@ -175,20 +170,20 @@ class Assembly:
         return video_source(self.scenario, camera)
 
     def truth_message(self, frame: int, *, with_visibility: bool = True) -> TruthMessage | None:
-        """The truth of a frame.
+        """The truth of a frame, or None where nobody knows it.
 
         Args:
             frame: Its index.
             with_visibility: Whether to work out what each camera sees of the target, where the world is
                 rendered; it takes some milliseconds.
         """
-        if self.truth is None:
+        if self.truth is None or not np.isfinite(self.truth[frame]).all():
             return None
         time_s = frame / self.scenario.rate_hz
         seen: dict[str, Visibility] = {}
         if self.world is not None and with_visibility:
-            person = str(self.scenario.target.person)
+            target = self.scenario.target
             for name, camera in self.cameras.items():
-                sight = visibility(self.world, camera, person, time_s)
+                sight = visibility(self.world, camera, target.subject, time_s, target.part)
                 seen[name] = Visibility(sight.in_view, sight.occluded)
         return TruthMessage(self.scenario.name, frame, time_s, self.truth[frame], seen)

@@ -2,7 +2,7 @@
 
 import ctypes
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
@@ -12,6 +12,7 @@ from nodes.counting.codebook import Codebook
 from nodes.counting.grid import rows_of_parts, sample_positions
 
 _int32, _pointer = ctypes.c_int32, ctypes.c_void_p
+_ROOTS = np.sqrt(np.arange(16384.0))
 
 
 class _Picture(ctypes.Structure):
@@ -32,10 +33,14 @@ class _Reference(ctypes.Structure):
         ("parts", _int32),
         ("codes", _int32),
         ("joints", _int32),
+        ("channels", _int32),
         ("first", _pointer),
         ("edges", _pointer),
-        ("marks", _pointer),
+        ("table", _pointer),
         ("scale", _pointer),
+        ("perfect", _pointer),
+        ("roots", _pointer),
+        ("known_roots", _int32),
     )
 
 
@@ -49,14 +54,14 @@ class _Sampling(ctypes.Structure):
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Coding:
     """How a pixel gets its joint index.
 
     Attributes:
         tables: What blue, green and red add to it.
         hue_bins: If above 0, the index is the bin of the hue instead.
-        grey_chroma, grey_saturation: Which pixels have no hue; see `nodes.filtering.color.hue_bins`.
+        grey_chroma, grey_saturation: Which pixels have no hue; see `nodes.filtering.hue.hue_bins`.
     """
 
     tables: UInt16[np.ndarray, "3 256"]
@@ -64,35 +69,58 @@ class Coding:
     grey_chroma: int = 0
     grey_saturation: int = 0
 
+    @cached_property
+    def address(self) -> int:
+        """Where the tables are."""
+        return int(self.tables.ctypes.data)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Marks:
-    """The codes that a pixel of each joint index counts for.
+class Compiled:
+    """A reference as C sees it.
 
     Attributes:
         book: The colours that are told apart.
-        of_joint: 1 where a pixel of joint index j counts for code k.
-        first: Where each part's codes begin, and where the last one's end.
+        structure: The codes of each joint index, and what the root of a count is worth.
+        kept: The arrays that the structure points to.
     """
 
     book: Codebook
-    of_joint: UInt8[np.ndarray, "J K"]
-    first: Int[np.ndarray, " P1"]
+    structure: _Reference
+    kept: tuple[np.ndarray, ...]
+
+
+def compile_reference(
+    book: Codebook, scale: Float[np.ndarray, " K"], perfect: Float[np.ndarray, " P"]
+) -> Compiled:
+    """Makes a reference ready: joint indices are its bins, or all combinations of bins of three channels.
+
+    Args:
+        book: The colours that are told apart.
+        scale: What the root of each code's count is worth.
+        perfect: The most that each part can contribute.
+    """
+    codes, edges = _joint_codes(book), book.part_edges
+    scale, perfect = np.ascontiguousarray(scale), np.ascontiguousarray(perfect)
+    n_parts, n_joints, n_channels = codes.shape
+    first = np.searchsorted(book.part, np.arange(n_parts + 1)).astype(np.int32)
+    structure = _Reference(
+        *(n_parts, len(book.part), n_joints, n_channels),
+        *(array.ctypes.data for array in (first, edges, codes, scale, perfect, _ROOTS)),
+        len(_ROOTS),
+    )
+    return Compiled(book, structure, (first, edges, codes, scale, perfect))
 
 
 @lru_cache(maxsize=64)
-def marks_of(book: Codebook) -> Marks:
-    """The marks of a codebook: of its bins, or of all combinations of bins where there are three channels."""
-    n_codes, (n_parts, n_channels, n_bins) = len(book.part), book.codes.shape
+def _joint_codes(book: Codebook) -> UInt16[np.ndarray, "P J C"]:
+    """The codes of each joint index in each part and channel; K where the colour is not told apart."""
+    n_channels, n_bins = book.codes.shape[1:]
     joint = np.arange(n_bins**n_channels)
-    marks = np.zeros((len(joint), n_codes + 1), np.uint8)
-    for channel in range(n_channels):
-        # red, green, blue are the digits of the joint index, red the first
-        digit = joint // n_bins ** (n_channels - 1 - channel) % n_bins
-        for codes in book.codes[:, channel]:
-            marks[joint, codes[digit]] = 1
-    first = np.searchsorted(book.part, np.arange(n_parts + 1)).astype(np.int32)
-    return Marks(book, np.ascontiguousarray(marks[:, :n_codes]), first)
+    # red, green, blue are the digits of the joint index, red the first
+    digits = [joint // n_bins ** (n_channels - 1 - channel) % n_bins for channel in range(n_channels)]
+    codes = np.stack([book.codes[:, channel, digit] for channel, digit in enumerate(digits)], axis=2)
+    return np.ascontiguousarray(codes, dtype=np.uint16)
 
 
 @lru_cache
@@ -109,70 +137,73 @@ def _samples(
     return _Sampling(grid[0], grid[1], x.ctypes.data, y.ctypes.data, part.ctypes.data), (x, y, part)
 
 
-def count_compiled(
+def distances_compiled(
     image: UInt8[np.ndarray, "H W 3"],
     coding: Coding,
     boxes: Float[np.ndarray, "N 4"],
-    marks: Marks,
-    scale: Float[np.ndarray, " K"],
+    reference: Compiled,
     grid: tuple[int, int] | None,
     kernel: str,
-) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, "N P"], Float[np.ndarray, " N"]]:
-    """Counts the colours in boxes, as `nodes.counting.histogram.count` does, and sums their roots up.
+) -> Float[np.ndarray, " N"]:
+    """Finds d² of each box to the reference, as `nodes.filtering.pattern.squared_distances` defines it.
 
     Args:
         image: The picture, blue, green, red.
         coding: From pixels to joint indices.
         boxes: left, top, right, bottom in pixels; NaN where there is none.
-        marks: From joint indices to codes.
-        scale: What the root of each code's count is worth.
+        reference: From joint indices to codes, and what they are worth.
         grid: Columns and rows of the samples, or None for every pixel.
         kernel: The density of the samples.
-
-    Returns:
-        Counts, pixels in each part, and Σ_p (Σ_k scale √count) / √pixels, the Bhattacharyya coefficient.
 
     Raises:
         KernelError: There is no compiled kernel.
         MemoryError: The boxes cover more than fits into memory.
     """
-    n, n_parts, n_codes = len(boxes), len(marks.first) - 1, marks.of_joint.shape[1]
+    return _run(image, coding, boxes, reference, grid, kernel)[: 8 * len(boxes)].view(float)
+
+
+def counts_compiled(
+    image: UInt8[np.ndarray, "H W 3"],
+    coding: Coding,
+    boxes: Float[np.ndarray, "N 4"],
+    reference: Compiled,
+    grid: tuple[int, int] | None,
+    kernel: str,
+) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, "N P"]]:
+    """Counts, and pixels in each part, as `nodes.counting.histogram.count` does; see `distances_compiled`."""
+    n, n_codes = len(boxes), len(reference.book.part)
+    found = _run(image, coding, boxes, reference, grid, kernel)[8 * n :].view(np.int32)
+    return found[: n * n_codes].reshape(n, n_codes), found[n * n_codes :].reshape(n, -1)
+
+
+def _run(
+    image: UInt8[np.ndarray, "H W 3"],
+    coding: Coding,
+    boxes: Float[np.ndarray, "N 4"],
+    reference: Compiled,
+    grid: tuple[int, int] | None,
+    kernel: str,
+) -> UInt8[np.ndarray, " bytes"]:
+    """Distances, counts and pixels one after the other, in one array: asking for its address takes time."""
+    n, book = len(boxes), reference.book
     if image.strides[1:] != (3, 1):
         image = np.ascontiguousarray(image)
-    boxes, scale, edges = (np.ascontiguousarray(values) for values in (boxes, scale, marks.book.part_edges))
-    counts, pixels = np.zeros((n, n_codes), np.int32), np.zeros((n, n_parts), np.int32)
-    coefficients = np.empty(n)
-    samples, _kept = _samples(grid, kernel, marks.book.part_heights)
+    boxes = np.ascontiguousarray(boxes)
+    at_counts, at_pixels = 8 * n, 8 * n + 4 * n * len(book.part)
+    found = np.zeros(at_pixels + 4 * n * len(book.part_heights), np.uint8)
+    samples, _kept = _samples(grid, kernel, book.part_heights)
     picture = _Picture(
-        image.ctypes.data,
-        image.strides[0],
-        *image.shape[:2],
-        coding.tables.ctypes.data,
-        coding.hue_bins,
-        coding.grey_chroma,
-        coding.grey_saturation,
+        *(image.ctypes.data, image.strides[0], *image.shape[:2]),
+        *(coding.address, coding.hue_bins, coding.grey_chroma, coding.grey_saturation),
     )
-    reference = _Reference(
-        n_parts,
-        n_codes,
-        len(marks.of_joint),
-        marks.first.ctypes.data,
-        edges.ctypes.data,
-        marks.of_joint.ctypes.data,
-        scale.ctypes.data,
-    )
+    address = found.ctypes.data
     failed = load_kernel().dcpf_count(
-        ctypes.byref(picture),
-        ctypes.byref(reference),
-        ctypes.byref(samples),
-        _pointer(boxes.ctypes.data),
-        _int32(n),
-        _pointer(counts.ctypes.data),
-        _pointer(pixels.ctypes.data),
-        _pointer(coefficients.ctypes.data),
+        *(ctypes.byref(picture), ctypes.byref(reference.structure), ctypes.byref(samples)),
+        *(_pointer(boxes.ctypes.data), _int32(n)),
+        *(_pointer(address), _pointer(address + at_counts), _pointer(address + at_pixels)),
     )
     if failed:
         raise MemoryError(
             f"the boxes cover too much of a picture of {image.shape[1]} x {image.shape[0]} pixels"
         )
-    return counts, pixels, coefficients
+    return found

@@ -3,6 +3,7 @@
 A processor of fixed cycles cannot do otherwise, and a frame costs the same at any distance.
 """
 
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise, starmap
 
@@ -18,46 +19,81 @@ MANY_WORDS = 4
 _ONE = np.uint64(1)
 
 
-def count_samples(
-    bins: Integer[np.ndarray, "C h w"],
+@dataclass(frozen=True, slots=True, eq=False)
+class GridSamples:
+    """A grid of samples of each box, as pixels of the picture.
+
+    Attributes:
+        x: Column of each of the c columns of samples, from 1; 0 and the width + 1 are outside.
+        y: Row of each of the r rows of samples, likewise.
+        region: left, top, right, bottom of what they cover, in the picture; at least one pixel.
+        parts: Which rows of samples lie in each part.
+        book: The colours that are told apart.
+    """
+
+    x: Int[np.ndarray, "c N"]
+    y: Int[np.ndarray, "r N"]
+    region: tuple[int, int, int, int]
+    parts: tuple[slice, ...]
+    book: Codebook
+
+    def count(
+        self, bins: Integer[np.ndarray, "C h w"]
+    ) -> tuple[Int[np.ndarray, "K N"], Int[np.ndarray, "P N"]]:
+        """Counts the colours of the samples.
+
+        Args:
+            bins: Bin indices of the pixels of the region.
+
+        Returns:
+            Counts of each code, and samples in each part that lie inside the picture.
+        """
+        (n_columns, n_boxes), book, (_, height, width) = self.x.shape, self.book, bins.shape
+        # Boxes are the last axis, the longest, which is what this function's time depends on.
+        x, y = self.x - self.region[0], self.y - self.region[1]
+        # Samples of a part that lie inside, from the separable grid
+        inside_x = ((x > 0) & (x <= width)).sum(axis=0)
+        inside_y = (y > 0) & (y <= height)
+        pixels = np.stack([inside_x * inside_y[rows].sum(axis=0) for rows in self.parts])
+        # Samples outside fall on a border one pixel wide, of a colour that nobody tells apart.
+        bordered = [_bordered(channel, book.codes.shape[2]) for channel in bins]
+        index = ((y * (width + 2))[:, None] + x).reshape(-1, n_boxes)
+        counts = np.zeros((len(book.part), n_boxes), dtype=np.intp)
+        for block in book.blocks:
+            rows = self.parts[block.part]
+            of_part = index[rows.start * n_columns : rows.stop * n_columns]
+            _count_block(bordered[block.channel], of_part, block, counts[block.codes])
+        return counts, pixels
+
+
+def grid_samples(
     boxes: Float[np.ndarray, "N 4"],
+    size_px: tuple[int, int],
     book: Codebook,
     grid: tuple[int, int],
     kernel: str,
-) -> tuple[Int[np.ndarray, "K N"], Int[np.ndarray, "P N"]]:
-    """Counts the colours of a grid of samples in each box.
+) -> GridSamples:
+    """Finds the samples of boxes.
 
     Args:
-        bins: Bin indices of the pixels.
-        boxes: left, top, right, bottom in pixels of `bins`.
+        boxes: left, top, right, bottom in pixels; NaN where there is none.
+        size_px: Width and height of the picture.
         book: The colours that are told apart.
         grid: Columns and rows.
         kernel: The density of the samples; see `sample_positions`.
-
-    Returns:
-        Counts of each code, and samples in each part that lie inside the picture.
     """
-    _, height, width = bins.shape
-    # Boxes are the last axis, the longest, which is what this function's time depends on.
     left, top, right, bottom = boxes.T
-    x = cells(left, right, sample_positions(grid[0], kernel, 1.0), width)
-    y = cells(top, bottom, sample_positions(grid[1], kernel, 0.5), height)
-    parts = rows_of_parts(grid[1], kernel, book.part_heights)
-    # Samples of a part that lie inside, from the separable grid
-    inside_x = ((x > 0) & (x <= width)).sum(axis=0)
-    inside_y = (y > 0) & (y <= height)
-    pixels = np.stack([inside_x * inside_y[rows].sum(axis=0) for rows in parts])
-    # Samples outside fall on a border one pixel wide, of a colour that nobody tells apart.
-    other = book.codes.shape[2]
-    bordered = [_bordered(channel, other) for channel in bins]
-    n_samples, n_boxes = grid[0] * grid[1], len(boxes)
-    index = ((y * (width + 2))[:, None] + x).reshape(n_samples, n_boxes)
-    counts = np.zeros((len(book.part), n_boxes), dtype=np.intp)
-    for block in book.blocks:
-        rows = parts[block.part]
-        of_part = index[rows.start * grid[0] : rows.stop * grid[0]]
-        _count_block(bordered[block.channel], of_part, block, counts[block.codes])
-    return counts, pixels
+    x = cells(left, right, sample_positions(grid[0], kernel, 1.0), size_px[0])
+    y = cells(top, bottom, sample_positions(grid[1], kernel, 0.5), size_px[1])
+    # where there is a sample outside, the region reaches to that border
+    first = [max(int(where.min(initial=size)) - 1, 0) for where, size in ((x, size_px[0]), (y, size_px[1]))]
+    last = [
+        min(int(where.max(initial=low + 1)), size)
+        for where, low, size in zip((x, y), first, size_px, strict=True)
+    ]
+    return GridSamples(
+        x, y, (first[0], first[1], last[0], last[1]), rows_of_parts(grid[1], kernel, book.part_heights), book
+    )
 
 
 def _bordered(bins: Integer[np.ndarray, "h w"], other: int) -> Integer[np.ndarray, "h2 w2"]:
@@ -100,7 +136,7 @@ def cells(
     position += low
     np.floor(position, out=position)
     position += 1
-    np.maximum(position, 0, out=position)
+    np.fmax(position, 0, out=position)  # NaN is outside
     np.minimum(position, size + 1, out=position)
     return position.astype(np.intp)
 

@@ -8,8 +8,8 @@ from pydantic import Field, PositiveInt
 
 from network.options import Options
 from nodes.counting.codebook import Codebook
-from nodes.counting.grid import count_samples
-from nodes.counting.pixels import count_pixels
+from nodes.counting.grid import GridSamples, grid_samples
+from nodes.counting.pixels import PixelBoxes, pixel_boxes
 
 
 class SamplingOptions(Options):
@@ -24,8 +24,24 @@ class SamplingOptions(Options):
     """Part of a box that must lie inside the picture for the camera to say anything about it."""
 
 
+def locate(
+    boxes: Float[np.ndarray, "N 4"], size_px: tuple[int, int], book: Codebook, sampling: SamplingOptions
+) -> PixelBoxes | GridSamples:
+    """Where in a picture to look for what boxes hold: its region, and then how to count in that.
+
+    Args:
+        boxes: left, top, right, bottom in pixels; they may reach over the border; NaN where there is none.
+        size_px: Width and height of the picture.
+        book: The colours that are told apart.
+        sampling: Which pixels count.
+    """
+    if sampling.grid is None:
+        return pixel_boxes(boxes, size_px, book)
+    return grid_samples(boxes, size_px, book, sampling.grid, sampling.kernel)
+
+
 def count(
-    bins: Integer[np.ndarray, "C h w"],
+    bins: Integer[np.ndarray, "C H W"],
     boxes: Float[np.ndarray, "N 4"],
     book: Codebook,
     sampling: SamplingOptions,
@@ -33,18 +49,15 @@ def count(
     """Counts the colours in boxes.
 
     Args:
-        bins: Bin indices of the pixels (of the region that the boxes need, or of the whole picture).
-        boxes: left, top, right, bottom relative to `bins`, in pixels; they may reach over the border, and are
-            NaN where there is none.
+        bins: Bin indices of the pixels of a picture.
+        boxes: As for `locate`.
         book: The colours that are told apart.
         sampling: Which pixels count.
 
     Returns:
         Counts of each code, and pixels (of one channel) in each part; pixels outside count nowhere.
     """
-    boxes = np.where(np.isnan(boxes), -1e6, boxes)
-    if sampling.grid is None:
-        counts, pixels = count_pixels(bins, boxes, book)
-    else:
-        counts, pixels = count_samples(bins, boxes, book, sampling.grid, sampling.kernel)
+    where = locate(boxes, (bins.shape[2], bins.shape[1]), book, sampling)
+    left, top, right, bottom = where.region
+    counts, pixels = where.count(bins[:, top:bottom, left:right])
     return counts.T, pixels.T

@@ -1,9 +1,11 @@
 """Colours: from pixels to histogram bins, with the camera's gain taken out.
 
-Sources: Jing & Chen, Eq. 7-8 (a histogram of each channel); Truong & Kim (2017), Eq. 10 (joint RGB).
+Sources: Jing & Chen, Eq. 7-8 (a histogram of each channel); Truong & Kim (2017), Eq. 10 (joint RGB); Medeiros
+et al. (2008), section 4 (hue), with the colour-free pixels of Pérez et al. (2002) in a bin of their own.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import cv2
@@ -13,19 +15,25 @@ from pydantic import Field, model_validator
 
 from network.options import Options
 from nodes.counting.compiled import Coding
+from nodes.filtering.hue import GREY_CHROMA, GREY_SATURATION, MAX_BINS, hue_bins
 
 GAIN_GRID_PX = 24
 """Every 24th pixel of every 24th line is enough for a median."""
+MAX_RGB_BINS = 16
+"""Most bins along a channel of RGB."""
 _VALUES = np.arange(256)
+_NO_TABLES = np.zeros((3, 256), np.uint16)
 
 
 class ColorOptions(Options):
     """Which colours are told apart, and in which parts of the target."""
 
-    space: Literal["rgb", "joint_rgb"] = "rgb"
-    """`rgb`: a histogram of each channel (Eq. 7-8); `joint_rgb`: one of the three together."""
-    bins_per_channel: int = Field(default=8, ge=2, le=16)
-    """Bins along each channel: 8 make 3 x 8 bins in `rgb` and 512 in `joint_rgb`."""
+    space: Literal["rgb", "joint_rgb", "hue"] = "rgb"
+    """`rgb`: a histogram of each channel (Eq. 7-8); `joint_rgb`: one of the three together; `hue`: one of the
+    hue alone, with a last bin for what is too grey to have one."""
+    bins_per_channel: int = Field(default=8, ge=2)
+    """Bins along each channel, at most 16 in RGB and 64 of the hue: 8 make 3 x 8 bins in `rgb`, 512 in
+    `joint_rgb`, in `hue` 7 sectors of the colour circle and one for grey."""
     parts: tuple[float, ...] = (1.0,)
     """Heights of the target's parts from top to bottom, as fractions that add up to 1; each has its own
     histogram."""
@@ -35,6 +43,15 @@ class ColorOptions(Options):
     """Whether colours that surround the target at the start count less, or not at all."""
     gain_correction: bool = False
     """Whether each channel's gain is brought back to that of the camera's first picture."""
+
+    @model_validator(mode="after")
+    def _not_too_many_bins(self) -> "ColorOptions":
+        most = MAX_BINS if self.space == "hue" else MAX_RGB_BINS
+        if self.bins_per_channel > most:
+            raise ValueError(
+                f"bins_per_channel is {self.bins_per_channel}: in {self.space} take at most {most}"
+            )
+        return self
 
     @model_validator(mode="after")
     def _every_part_has_a_weight(self) -> "ColorOptions":
@@ -56,7 +73,7 @@ class ColorOptions(Options):
     @property
     def n_bins(self) -> int:
         """Bins of a histogram."""
-        return self.bins_per_channel if self.space == "rgb" else self.bins_per_channel**3
+        return self.bins_per_channel**3 if self.space == "joint_rgb" else self.bins_per_channel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,11 +118,26 @@ def quantize(
 
     Returns:
         Bin indices from 0 to n_bins - 1: the channels red, green, blue in `rgb`; in `joint_rgb`
-        r·b² + g·b + b for b bins a channel (Truong & Kim, Eq. 10).
+        r·n² + g·n + b for n bins a channel (Truong & Kim, Eq. 10); in `hue` those of `hue_bins`.
     """
-    tables = _tables(options, gain).astype(np.uint8 if options.n_bins <= 256 else np.uint16)
-    blue, green, red = cv2.split(cv2.LUT(image, np.ascontiguousarray(tables.T)[None]))
-    return np.stack([red, green, blue]) if options.space == "rgb" else (red + green + blue)[None]
+    if options.space == "hue":
+        return hue_bins(without_gain(image, gain), options.n_bins)[None]
+    n = options.bins_per_channel
+    if 256 % n == 0 and np.all(gain == 1.0):
+        # floor(n · value / 256) without a table
+        values = np.right_shift(image, 8 - (n - 1).bit_length())
+        if options.space == "joint_rgb":
+            blue, green, red = cv2.split(values)
+            dtype = np.uint8 if options.n_bins <= 256 else np.uint16
+            return (red.astype(dtype) * dtype(n * n) + green.astype(dtype) * dtype(n) + blue)[None]
+    else:
+        tables = _tables(options, gain).astype(np.uint8 if options.n_bins <= 256 else np.uint16)
+        values = cv2.LUT(image, np.ascontiguousarray(tables.T)[None])
+        if options.space == "joint_rgb":
+            blue, green, red = cv2.split(values)
+            return (red + green + blue)[None]
+    # side by side in memory, four bytes a pixel, as counting wants them
+    return np.moveaxis(cv2.cvtColor(values, cv2.COLOR_BGR2RGBA), -1, 0)[:3]
 
 
 def _tables(options: ColorOptions, gain: Float[np.ndarray, " 3"]) -> Int[np.ndarray, "3 256"]:
@@ -123,7 +155,24 @@ def _digits(n: int) -> Int[np.ndarray, "3 1"]:
 
 def coding(options: ColorOptions, gain: Float[np.ndarray, " 3"]) -> Coding:
     """The joint index of a pixel for the compiled kernel: its digits are the bins of red, green and blue."""
-    tables = _tables(options, gain)
+    return _coding(options, gain.tobytes())
+
+
+@lru_cache(maxsize=64)
+def _coding(options: ColorOptions, gain: bytes) -> Coding:
+    if options.space == "hue":
+        return Coding(_NO_TABLES, options.n_bins, GREY_CHROMA, GREY_SATURATION)
+    tables = _tables(options, np.frombuffer(gain))
     if options.space == "rgb":
         tables = tables * _digits(options.bins_per_channel)
     return Coding(tables.astype(np.uint16))
+
+
+def without_gain(
+    image: UInt8[np.ndarray, "H W 3"], gain: Float[np.ndarray, " 3"]
+) -> UInt8[np.ndarray, "H W 3"]:
+    """The picture with each channel's gain divided out, rounded to grey levels."""
+    if np.all(gain == 1.0):
+        return image
+    levels = np.minimum(np.rint(_VALUES / gain[:, None]), 255).astype(np.uint8)
+    return np.asarray(cv2.LUT(image, np.ascontiguousarray(levels.T)[None]), dtype=np.uint8)

@@ -171,7 +171,9 @@ def fuse(
     # Where nobody saw anything, the prediction stands.
     if not (fused.gain.matrix.any() or fused.gain.vector.any()):
         return predicted
-    if options.proposal == "optimal" and fused.is_density:
+    # What moves without noise cannot be drawn otherwise than it was: a factor on it can only weight.
+    is_noisy = motion.variances[: len(fused.gain.vector)].all()
+    if options.proposal == "optimal" and fused.is_density and is_noisy:
         return draw_optimal(previous, fused, motion, rng)
     return reweight_by_ratio(predicted, fused)
 

@@ -1,10 +1,12 @@
-"""The state model: constant velocity with independent noise on position and velocity.
+"""The state models: constant velocity, and an autoregression on the last two positions.
 
-Source: Jing & Chen, Eq. 1, 5 and 18, in metres and seconds. A state is [x, y, vx, vy] on a plane and
-[x, y, z, vx, vy, vz] in a volume; the first half of it is the position.
+Sources: Jing & Chen, Eq. 1, 5 and 18, in seconds and the space's unit of length: the state is position and
+velocity, [x, y, vx, vy] or [x, y, z, vx, vy, vz]. Medeiros et al. (2008), Eq. 2: it is this position and the
+last one, [x, y, x_prev, y_prev]. The first half of a state is the position in both.
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -12,14 +14,27 @@ from pydantic import Field
 
 from network.options import Options
 
+Matrix2 = tuple[tuple[float, float], tuple[float, float]]
+
 
 class DynamicsOptions(Options):
     """How the target is expected to move from one frame to the next."""
 
+    model: Literal["constant_velocity", "autoregressive"] = "constant_velocity"
+    """`constant_velocity`: position and velocity, each with its noise; `autoregressive`: the next position is
+    A times this one plus B times the last one, plus noise."""
     position_variance: float = Field(default=1e-3, gt=0)
-    """Variance that a frame adds to each position axis, in m² (the paper's 10 cm²)."""
+    """Variance that a frame adds to each position axis, in m² (the paper's 10 cm²), in px² in the image
+    plane."""
     velocity_variance: float = Field(default=1e-2, gt=0)
-    """Variance that a frame adds to each velocity axis, in (m/s)² (the paper's 1 (cm/frame)² at 10 Hz)."""
+    """Variance that a frame adds to each velocity axis, in (m/s)² (the paper's 1 (cm/frame)² at 10 Hz), in
+    (px/s)² in the image plane; for constant velocity only."""
+    A: float | Matrix2 = 1.5
+    """Weight of this position, a number or a 2 x 2 matrix (autoregressive). A = 2, B = -1 keeps the velocity,
+    A = 1, B = 0 forgets it; between them it fades."""
+    B: float | Matrix2 = -0.5
+    """Weight of the last position. Where A + B is not 1, the target is drawn to the origin or away from
+    it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +43,7 @@ class MotionModel:
 
     Attributes:
         F: Transition matrix.
-        variances: Diagonal of the process noise's covariance Q, per frame.
+        variances: Diagonal of the process noise's covariance Q, per frame; 0 where the state only remembers.
     """
 
     F: Float[np.ndarray, "D D"]
@@ -46,6 +61,32 @@ def constant_velocity(n_axes: int, interval: float, options: DynamicsOptions) ->
     F[:n_axes, n_axes:] = interval * np.eye(n_axes)
     variances = np.repeat([options.position_variance, options.velocity_variance], n_axes)
     return MotionModel(F, variances)
+
+
+def autoregression(n_axes: int, options: DynamicsOptions) -> MotionModel:
+    """x(t+1) = A x(t) + B x(t-1) + n, n ~ N(0, σ² I) (Medeiros et al. 2008, Eq. 2).
+
+    Args:
+        n_axes: Axes of the position.
+        options: A and B, numbers, or matrices where there are two axes; σ² is the position variance.
+    """
+    # [x(t+1), x(t)] = [A B; I 0] [x(t), x(t-1)] + [n, 0]
+    F = np.zeros((2 * n_axes, 2 * n_axes))
+    F[:n_axes, :n_axes] = _matrix(options.A, n_axes)
+    F[:n_axes, n_axes:] = _matrix(options.B, n_axes)
+    F[n_axes:, :n_axes] = np.eye(n_axes)
+    return MotionModel(F, np.repeat([options.position_variance, 0.0], n_axes))
+
+
+def _matrix(weight: float | Matrix2, n_axes: int) -> Float[np.ndarray, "A A"]:
+    return np.array(weight) if isinstance(weight, tuple) else weight * np.eye(n_axes)
+
+
+def motion_model(n_axes: int, interval: float, options: DynamicsOptions) -> MotionModel:
+    """The model that the options name, for frames `interval` seconds apart."""
+    if options.model == "autoregressive":
+        return autoregression(n_axes, options)
+    return constant_velocity(n_axes, interval, options)
 
 
 def transition(states: Float[np.ndarray, "N D"], model: MotionModel) -> Float[np.ndarray, "N D"]:

@@ -4,7 +4,6 @@ Source: Jing & Chen, Eq. 6-8 and 11-12, on boxes that follow from the camera's g
 camera and one picture lives here; nothing about particles' weights does.
 """
 
-import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -14,8 +13,8 @@ from jaxtyping import Float, Int, UInt8
 from network.options import Options
 from nodes.camera import Camera
 from nodes.counting.codebook import Codebook
-from nodes.counting.compiled import count_compiled, marks_of
-from nodes.counting.histogram import SamplingOptions, count
+from nodes.counting.compiled import distances_compiled
+from nodes.counting.histogram import SamplingOptions, locate
 from nodes.filtering.appearance import (
     Appearance,
     ModelUpdateOptions,
@@ -30,6 +29,7 @@ from nodes.filtering.color import (
     coding,
     gain_reference,
     quantize,
+    without_gain,
 )
 from nodes.filtering.likelihood import LikelihoodOptions, background_constants, log_likelihoods
 from nodes.filtering.pattern import coefficients, full_codebook, pattern_of, squared_distances
@@ -121,14 +121,14 @@ class ObservationModel:
     ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
         """d² to the reference and visible part of the box at each position."""
         boxes = project_boxes(positions, self.target, self.camera)
-        return self._box_distances(picture, boxes, appearance)
+        return self.box_distances(picture, boxes, appearance), visible_fraction(boxes, self.camera)
 
     def sight(self, picture: Picture, position: Float[np.ndarray, " A"], appearance: Appearance) -> Sight:
         """What the target's box at a position shows."""
         boxes = project_boxes(position[None], self.target, self.camera)
         visible = visible_fraction(boxes, self.camera)
         pattern = pattern_of(appearance, self.options.color, all_bins=True)
-        counts, pixels = self._count(picture, boxes, visible, pattern.book)
+        counts, pixels = self._count(picture, boxes, pattern.book)
         distance = squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
         histograms = normalize_counts(counts, pixels, self.options.color)[0]
         return Sight(histograms, float(distance[0]), float(visible[0]))
@@ -151,7 +151,7 @@ class ObservationModel:
         if len(around) and self.options.color.background_weighting:
             background = self._histograms(picture, around).mean(axis=0)
             appearance = replace(appearance, distinctness=distinctness_of(histograms, background))
-        distance, _ = self._box_distances(picture, around, appearance)
+        distance = self.box_distances(picture, around, appearance)
         miss_distance, variance = background_constants(distance, self.options.likelihood)
         return replace(appearance, miss_distance=miss_distance, variance=variance)
 
@@ -179,55 +179,36 @@ class ObservationModel:
             return appearance
         return self.first_appearance(picture, position) or appearance
 
-    def _box_distances(
+    def box_distances(
         self, picture: Picture, boxes: Float[np.ndarray, "N 4"], appearance: Appearance
-    ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
-        visible = visible_fraction(boxes, self.camera)
+    ) -> Float[np.ndarray, " N"]:
+        """d² of each box to the reference, counted by the backend of the options."""
         pattern = pattern_of(appearance, self.options.color)
         if self.options.backend == "compiled":
-            sampling = self.options.sampling
-            _, pixels, coefficient = count_compiled(
-                picture.image,
-                coding(self.options.color, picture.gain),
-                boxes,
-                marks_of(pattern.book),
-                pattern.scale,
-                sampling.grid,
-                sampling.kernel,
-            )
-        else:
-            counts, pixels = self._count(picture, boxes, visible, pattern.book)
-            coefficient = coefficients(counts, pixels, pattern)
-        return squared_distances(coefficient, pixels, pattern), visible
+            sampling, color = self.options.sampling, self.options.color
+            image, code = picture.image, coding(color, picture.gain)
+            if color.space == "hue":
+                image = without_gain(image, picture.gain)
+            return distances_compiled(image, code, boxes, pattern.compiled, sampling.grid, sampling.kernel)
+        counts, pixels = self._count(picture, boxes, pattern.book)
+        return squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
 
     def _histograms(self, picture: Picture, boxes: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N P C B"]:
-        color, visible = self.options.color, visible_fraction(boxes, self.camera)
-        counts, pixels = self._count(picture, boxes, visible, full_codebook(color))
+        color = self.options.color
+        counts, pixels = self._count(picture, boxes, full_codebook(color))
         return normalize_counts(counts, pixels, color)
 
     def _count(
-        self,
-        picture: Picture,
-        boxes: Float[np.ndarray, "N 4"],
-        visible: Float[np.ndarray, " N"],
-        book: Codebook,
+        self, picture: Picture, boxes: Float[np.ndarray, "N 4"], book: Codebook
     ) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, "N P"]]:
         # Only the region that the boxes cover is quantised.
-        left, top, right, bottom = covered_region(boxes[visible > 0], self.camera)
-        bins = quantize(picture.image[top:bottom, left:right], self.options.color, picture.gain)
-        return count(bins, boxes - np.array([left, top, left, top]), book, self.options.sampling)
-
-
-def covered_region(boxes: Float[np.ndarray, "N 4"], camera: Camera) -> tuple[int, int, int, int]:
-    """left, top, right, bottom of the part of the picture that boxes in it cover; at least one pixel."""
-    if not len(boxes):
-        return 0, 0, 1, 1
-    lefts, tops, rights, bottoms = boxes.T
-    left = min(max(math.floor(lefts.min()), 0), camera.width_px - 1)
-    top = min(max(math.floor(tops.min()), 0), camera.height_px - 1)
-    right = min(max(math.ceil(rights.max()), left + 1), camera.width_px)
-    bottom = min(max(math.ceil(bottoms.max()), top + 1), camera.height_px)
-    return left, top, right, bottom
+        size_px = self.camera.width_px, self.camera.height_px
+        where = locate(boxes, size_px, book, self.options.sampling)
+        left, top, right, bottom = where.region
+        counts, pixels = where.count(
+            quantize(picture.image[top:bottom, left:right], self.options.color, picture.gain)
+        )
+        return counts.T, pixels.T
 
 
 def surrounding_boxes(box: Float[np.ndarray, " 4"]) -> Float[np.ndarray, "N 4"]:

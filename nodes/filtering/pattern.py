@@ -5,18 +5,19 @@ Chen, Eq. 11), and over the parts of the target by their weights; its root is Tr
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from nodes.counting.codebook import Codebook, codebook
+from nodes.counting.compiled import Compiled, compile_reference
 from nodes.filtering.appearance import Appearance
 from nodes.filtering.color import ColorOptions
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Pattern:
     """What boxes are compared with.
 
@@ -31,6 +32,11 @@ class Pattern:
     scale: Float[np.ndarray, " K"]
     ends: Int[np.ndarray, " P1"]
     perfect: Float[np.ndarray, " P"]
+
+    @cached_property
+    def compiled(self) -> Compiled:
+        """The same for the compiled kernel."""
+        return compile_reference(self.book, self.scale, self.perfect)
 
 
 @lru_cache(maxsize=64)  # of a camera's latest references; they are compared by identity
@@ -60,7 +66,9 @@ def coefficients(
     counts: Int[np.ndarray, "N K"], pixels: Int[np.ndarray, "N P"], pattern: Pattern
 ) -> Float[np.ndarray, " N"]:
     """Sums up Σ_p w_p Σ_b ω √(h q) of each box, h = counts / pixels."""
-    terms, of_box = pattern.scale[:, None] * np.sqrt(counts.T), pixels.T
+    terms, of_box = counts.T.astype(float), pixels.T
+    np.sqrt(terms, out=terms)
+    terms *= pattern.scale[:, None]
     total = np.zeros(len(counts))
     for part, (first, last) in enumerate(pairwise(pattern.ends)):
         total += _sum_in_order(terms[first:last]) / np.sqrt(np.maximum(of_box[part], 1))
@@ -88,5 +96,11 @@ def squared_distances(
         pixels: Of each part that are in the picture.
         pattern: The reference.
     """
-    perfect = pattern.perfect @ (pixels.T > 0)
-    return 1 - np.divide(coefficient, perfect, out=np.zeros_like(perfect), where=perfect > 0)
+    seen = pixels.T > 0
+    total = float(pattern.perfect.sum())
+    if total > 0 and seen.all():
+        return 1 - coefficient / total
+    # Σ_p w_p Σ_b ω q over the parts that are in the picture
+    perfect = (pattern.perfect[:, None] * seen).sum(axis=0)
+    known = perfect > 0
+    return np.asarray(1 - np.where(known, coefficient, 0) / np.where(known, perfect, 1))

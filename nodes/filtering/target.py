@@ -4,7 +4,7 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import Field
+from pydantic import Field, PositiveFloat, model_validator
 
 from network.options import Options
 from nodes.camera import Camera
@@ -15,40 +15,76 @@ _TRUNK_ASPECT = np.array([1.0, MIN_ASPECT])
 
 
 class StartOptions(Options):
-    """What every filter is told about the target at frame 0."""
+    """What every filter is told about the target at frame 0.
+
+    In m and m/s; in the image plane in px and px/s.
+    """
 
     position: tuple[float, ...] | Literal["truth"] = "truth"
-    """Where the target is at frame 0, in metres, or `truth`: where the ground truth has it."""
+    """Where the target is at frame 0, or `truth`: where the ground truth has it."""
     position_error: float = Field(default=0.05, ge=0)
-    """Standard deviation of the error that the seed adds to that position, on each axis, in m."""
+    """Standard deviation of the error that the seed adds to that position, on each axis."""
     velocity: tuple[float, ...] = (0.0, 0.0)
-    """Velocity at frame 0, in m/s, one number an axis."""
+    """Velocity at frame 0, one number an axis."""
     position_deviation: float = Field(default=0.1, gt=0)
-    """Standard deviation of the first particles' positions, in m."""
+    """Standard deviation of the first particles' positions."""
     velocity_deviation: float = Field(default=0.15, gt=0)
-    """Standard deviation of the first particles' velocities, in m/s."""
+    """Standard deviation of the first particles' velocities."""
 
 
 class TargetOptions(Options):
     """What is tracked."""
 
-    space: Literal["plane", "volume"] = "plane"
-    """`plane`: on a horizontal plane, state [x, y, vx, vy]; `volume`: [x, y, z, vx, vy, vz]."""
+    space: Literal["plane", "volume", "image"] = "plane"
+    """`plane`: on a horizontal plane, state [x, y, vx, vy]; `volume`: [x, y, z, vx, vy, vz]; `image`: in the
+    pixels of one camera, [x, y, vx, vy]. Autoregressive dynamics have the last position for the velocity."""
     person: str | None = None
     """Name of the person in the world that is the target; not needed for footage."""
+    object: str | None = None
+    """Name of the object in the world that is the target, instead of a person."""
+    part: Literal["body", "head"] = "body"
+    """What of a person is the target, in a volume or in the image plane."""
     plane_height: float = 0.0
     """Height of the plane above the floor, in m; the target stands on it (people's feet: 0)."""
     height: float = Field(default=1.75, gt=0)
     """Height of the target, in m."""
     width: float = Field(default=0.4, gt=0)
     """Width of the target, in m; of a person the trunk, so that boxes show more of them than of the room."""
+    size_px: tuple[PositiveFloat, PositiveFloat] | None = None
+    """Width and height of the target's box in the image plane, in px, in place of the two in m."""
     start: StartOptions = StartOptions()
     """The target at frame 0."""
 
+    @model_validator(mode="after")
+    def _size_in_the_spaces_unit(self) -> "TargetOptions":
+        if self.space != "image":
+            if self.size_px is not None:
+                raise ValueError(
+                    "size_px is for the image plane: on a plane or in a volume give height and width, in m"
+                )
+            return self
+        if self.size_px is None:
+            raise ValueError("the image plane needs size_px, the target's width and height in pixels: add it")
+        fields = type(self).model_fields
+        for key in ("height", "width", "plane_height"):
+            if getattr(self, key) != fields[key].default:
+                raise ValueError(f"{key} is in m and means nothing in the image plane: give size_px instead")
+        return self
+
     @property
     def n_axes(self) -> int:
-        """Axes of the position: 2 on a plane, 3 in a volume."""
-        return 2 if self.space == "plane" else 3
+        """Axes of the position: 3 in a volume, else 2."""
+        return 3 if self.space == "volume" else 2
+
+    @property
+    def subject(self) -> str:
+        """Name of the person or object in the world that is the target; empty for footage."""
+        return self.person or self.object or ""
+
+    @property
+    def unit(self) -> Literal["m", "px"]:
+        """The unit of the position."""
+        return "px" if self.space == "image" else "m"
 
 
 def project_boxes(
@@ -57,10 +93,12 @@ def project_boxes(
     """The box that the target would fill in a camera's picture at each position.
 
     A box of fixed size would cost a factor of two in accuracy: the size in metres is projected, the height
-    from foot to head and the width at the depth between them.
+    from foot to head and the width at the depth between them. In the image plane nothing tells how far away
+    the target is, and its box has one size.
 
     Args:
-        positions: Foot points on the plane (2 axes) or centres in the volume (3 axes), metres.
+        positions: Foot points on the plane (2 axes) or centres in the volume (3 axes), metres; or centres in
+            the picture, pixels, (0, 0) being the middle of the top left one.
         target: Space and size.
         camera: The camera.
 
@@ -68,6 +106,9 @@ def project_boxes(
         left, top, right, bottom in pixels, pixel edges at whole numbers; NaN where the target cannot be
         pictured from there, or would be less than two pixels high.
     """
+    if target.size_px is not None:
+        middle, half = positions + 0.5, 0.5 * np.array(target.size_px)
+        return np.concatenate((middle - half, middle + half), axis=1)
     n, n_axes = positions.shape
     body = np.empty((2, n, 3))
     body[:, :, :n_axes] = positions

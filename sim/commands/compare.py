@@ -13,12 +13,13 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from sim.commands.shared import AsJson, Frames, Overrides, progress_bar, split_overrides
+from sim.commands.shared import AsJson, Frames, Overrides, length_text, progress_bar, split_overrides
 from sim.experiments.found.claims import Verdict
 from sim.experiments.options import ExperimentOptions, StudyOptions, is_experiment
 from sim.experiments.plan import Plan, make_plan, plan_experiment
 from sim.experiments.sweeps import parse_sweep
 from sim.running.recorder import RecordingError
+from sim.running.results import length
 from sim.scenario.document import read_document
 from sim.scenario.parsing import ScenarioError
 
@@ -147,17 +148,18 @@ def _print_table(console: Console, keys: tuple[str, ...], rows: dict[str, Any]) 
                 *each["settings"].values(),
                 title,
                 *(
-                    _figure(each["rmse_m"][name], statistic, " m", 3)
-                    for name in ("dcpf", "cpf", "best_single")
+                    _length(length(each, "rmse")[track], statistic, each["unit"])
+                    for track in ("dcpf", "cpf", "best_single")
                 ),
-                _figure(each["ratio_dcpf_cpf"], statistic, "", 2),
-                _figure(each["anees"]["dcpf"], statistic, "", 2),
+                _figure(each["ratio_dcpf_cpf"], statistic),
+                _figure(each["anees"]["dcpf"], statistic),
             )
     console.print(table)
 
 
 def _print_more(console: Console, label: str, each: dict[str, Any]) -> None:
-    lost, disagreement = each["lost_fraction"], _figure(each["disagreement_m"], "median", " m", 3)
+    lost = each["lost_fraction"]
+    disagreement = _length(length(each, "disagreement"), "median", each["unit"])
     console.print(
         f"{label}: target lost in {lost['dcpf']:.0%} of the runs by DCPF, in {lost['cpf']:.0%} by CPF;"
         f" nodes disagree by {disagreement}",
@@ -169,5 +171,9 @@ def _print_more(console: Console, label: str, each: dict[str, Any]) -> None:
         console.print(f"  Eq. 17's ratio was no density in {share} of the local results", soft_wrap=True)
 
 
-def _figure(values: dict[str, float] | None, statistic: str, unit: str, digits: int) -> str:
-    return "–" if values is None else f"{values[statistic]:.{digits}f}{unit}"
+def _length(values: dict[str, float] | None, statistic: str, unit: str) -> str:
+    return length_text(None if values is None else values[statistic], unit)
+
+
+def _figure(values: dict[str, float] | None, statistic: str) -> str:
+    return "–" if values is None else f"{values[statistic]:.2f}"

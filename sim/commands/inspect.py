@@ -12,7 +12,7 @@ from sim.assembly import Assembly
 from sim.commands.shared import AsJson, Overrides, ScenarioPath, read_scenario
 from sim.experiments.options import ExperimentOptions
 from sim.footage import fetch
-from sim.scenario.model import Scenario
+from sim.scenario.model import SPACES, Scenario
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -44,7 +44,7 @@ def check(scenario: ScenarioPath, overrides: Overrides = None, as_json: AsJson =
         x, y, z = camera.center
         place = f"{camera.width_px} x {camera.height_px} pixels, at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         table.add_row(name, f"{place}, talks to {', '.join(assembly.graph.neighbors(name)) or 'nobody'}")
-    table.add_row("target", f"in a {chosen.target.space}, starts at {start.mean.round(2).tolist()}")
+    table.add_row("target", f"{SPACES[chosen.target.space]}, starts at {start.mean.round(2).tolist()}")
     table.add_row("processes", str(chosen.n_processes))
     Console(highlight=False).print(table)
 

@@ -17,14 +17,14 @@ from sim.commands.shared import (
     Overrides,
     ScenarioPath,
     Seed,
-    meters,
+    length_text,
     progress_bar,
     read_scenario,
     yes_no,
 )
 from sim.running.in_process import run_in_process
 from sim.running.recorder import Recorder, default_folder
-from sim.running.results import Results, summarize
+from sim.running.results import Results, length, summarize
 from sim.scenario.model import Scenario
 
 
@@ -108,17 +108,21 @@ def _print(summary: dict[str, Any], scenario: Scenario, folder: Path) -> None:
     table = Table()
     for heading in ("estimator", "RMSE", "lost", "ANEES"):
         table.add_column(heading, justify="left" if heading == "estimator" else "right")
-    rmse, lost, anees = summary["rmse_m"], summary["lost"], summary["anees"]
-    table.add_row("DCPF (all nodes)", meters(rmse["dcpf"]), yes_no(lost["dcpf"]), _plain(anees["dcpf"]))
+    rmse, lost, anees, unit = length(summary, "rmse"), summary["lost"], summary["anees"], summary["unit"]
+    table.add_row(
+        "DCPF (all nodes)", length_text(rmse["dcpf"], unit), yes_no(lost["dcpf"]), _plain(anees["dcpf"])
+    )
     if scenario.baselines.cpf:
-        table.add_row("CPF", meters(rmse["cpf"]), yes_no(lost["cpf"]), _plain(anees["cpf"]))
+        table.add_row("CPF", length_text(rmse["cpf"], unit), yes_no(lost["cpf"]), _plain(anees["cpf"]))
     for node, value in rmse["single"].items():
-        table.add_row(f"{node} alone", meters(value), yes_no(lost["single"][node]), "")
+        table.add_row(f"{node} alone", length_text(value, unit), yes_no(lost["single"][node]), "")
     console.print(table)
     if summary["ratio_dcpf_cpf"] is not None:
         console.print(f"DCPF / CPF: {summary['ratio_dcpf_cpf']:.2f}")
     sent = summary["network"]["bytes_per_frame"]
-    console.print(f"nodes disagree by {meters(summary['disagreement_m'])} in the mean")
+    if len(summary["cameras"]) > 1:
+        apart = length_text(length(summary, "disagreement"), unit)
+        console.print(f"nodes disagree by {apart} in the mean")
     console.print(f"bytes a frame: DCPF {sent['dcpf']:,.0f}, CPF {sent['cpf']:,.0f}")
     indefinite = summary["fusion"]["indefinite_local_fraction"]
     if indefinite:

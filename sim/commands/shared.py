@@ -69,9 +69,9 @@ def progress_bar(what: str, total: int) -> Iterator[Callable[[int], None]]:
         yield lambda done: progress.update(task, completed=done)
 
 
-def meters(value: float | None) -> str:
-    """A length for a table."""
-    return "–" if value is None else f"{value:.3f} m"
+def length_text(value: float | None, unit: str) -> str:
+    """A length for a table: to a millimetre, or to a tenth of a pixel."""
+    return "–" if value is None else f"{value:.{1 if unit == 'px' else 3}f} {unit}"
 
 
 def yes_no(value: bool | None) -> str:

@@ -43,9 +43,10 @@ def watch(
 
 def _table(latest: dict[tuple[str, str, str], EstimateMessage], endpoint: str) -> Table:
     waiting = f"waiting for a run at {endpoint}"
-    table = Table(caption="Ctrl-C to end" if latest else waiting, caption_justify="left")
-    for heading in ("run", "estimator", "node", "frame", "position (m)", "± (m)", "sees it", "lost"):
-        table.add_column(heading, justify="right" if heading in ("frame", "± (m)") else "left")
+    hint = "in metres, in pixels where one camera tracks in its image plane; Ctrl-C to end"
+    table = Table(caption=hint if latest else waiting, caption_justify="left")
+    for heading in ("run", "estimator", "node", "frame", "position", "±", "sees it", "lost"):
+        table.add_column(heading, justify="right" if heading in ("frame", "±") else "left")
     for (run, estimator, node), message in sorted(latest.items()):
         n_axes = len(message.mean) // 2
         position = ", ".join(f"{value:7.3f}" for value in message.mean[:n_axes])

@@ -21,15 +21,16 @@ class Loss:
     found: int | None
 
 
-def losses(errors: Float[np.ndarray, " T"]) -> tuple[Loss, ...]:
-    """The times in which the error stays above 0.8 m, or unknown, for five frames or more.
+def losses(errors: Float[np.ndarray, " T"], limit: float = LOST_ERROR) -> tuple[Loss, ...]:
+    """The times in which the error stays above a limit, or unknown, for five frames or more.
 
     It ends with the first frame whose error is not.
 
     Args:
         errors: By frame; NaN where there is no estimate.
+        limit: In the errors' unit.
     """
-    astray = np.isnan(errors) | (errors > LOST_ERROR)
+    astray = np.isnan(errors) | (errors > limit)
     # Where it goes astray, and where it comes back.
     turns = np.diff(np.concatenate([[0], astray.astype(int), [0]]))
     starts, ends = np.flatnonzero(turns == 1), np.flatnonzero(turns == -1)

@@ -9,30 +9,25 @@ Sources: Schuhmacher, Vo & Vo (2008), Eq. 3; Rahmathullah, García-Fernández & 
 import numpy as np
 from jaxtyping import Float
 
-CUTOFF = 0.8
-"""c: an estimate that is farther away, m, is as bad as none."""
 
-
-def ospa(errors: Float[np.ndarray, " T"], cutoff: float = CUTOFF) -> Float[np.ndarray, " T"]:
+def ospa(errors: Float[np.ndarray, " T"], cutoff: float) -> Float[np.ndarray, " T"]:
     """OSPA in each frame: min(c, ‖x - y‖), and c where the one target has no estimate. Any order p.
 
     Args:
         errors: Distance between estimate and truth in each frame; NaN where there is no estimate.
-        cutoff: c, in the errors' unit.
+        cutoff: c, in the errors' unit: an estimate that is farther away is as bad as none.
     """
     return np.where(np.isnan(errors), cutoff, np.fmin(errors, cutoff))
 
 
-def gospa(
-    errors: Float[np.ndarray, " T"], cutoff: float = CUTOFF, order: float = 2
-) -> Float[np.ndarray, " T"]:
+def gospa(errors: Float[np.ndarray, " T"], cutoff: float, order: float = 2) -> Float[np.ndarray, " T"]:
     """GOSPA (α = 2) in each frame: min(c, ‖x - y‖), and c / 2^(1/p) where the one target has no estimate.
 
     A target that is farther than c from its estimate counts as one missed and one false: c in all.
 
     Args:
         errors: Distance between estimate and truth in each frame; NaN where there is no estimate.
-        cutoff: c, in the errors' unit.
+        cutoff: c, in the errors' unit: an estimate that is farther away is as bad as none.
         order: p, at least 1.
     """
     return np.where(np.isnan(errors), cutoff / 2 ** (1 / order), np.fmin(errors, cutoff))

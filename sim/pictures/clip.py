@@ -1,4 +1,7 @@
-"""A clip of a run for a page: the cameras' pictures, the ground from above and the error over time."""
+"""A clip of a run for a page: the cameras' pictures, the ground from above and the error over time.
+
+Of one camera that tracks in its image plane, the picture and the error: there is no ground to see.
+"""
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
@@ -80,7 +83,7 @@ def make_clip(
         results: The run.
         assembly: Its scenario, put together; gives the pictures.
         path: A file that ends in .webp (small, many colours) or .gif (shown everywhere).
-        width_px: Width of the clip; its height follows.
+        width_px: Width of the clip, at most; its height follows.
         fps: Pictures a second.
         every: Every which frame is shown.
         progress: Called after each picture with how many there are, and will be.
@@ -117,10 +120,15 @@ class _Scene:
         cameras = list(assembly.cameras.values())
         aspect = float(np.median([camera.width_px / camera.height_px for camera in cameras]))
         tallest = round(_TALLEST * width_px)
-        self._tiling = tile(len(cameras), aspect, round(_CAMERAS_SHARE * width_px), tallest)
-        height_px = self._tiling.rows * self._tiling.height_px
-        map_width = width_px - self._tiling.columns * self._tiling.width_px
-        self._map = GroundMap(results, assembly, map_width, height_px)
+        on_ground = results.scenario.target.space != "image"
+        share = _CAMERAS_SHARE if on_ground else 1.0
+        self._tiling = tile(len(cameras), aspect, round(share * width_px), tallest)
+        if on_ground:
+            height_px = self._tiling.rows * self._tiling.height_px
+            map_width = width_px - self._tiling.columns * self._tiling.width_px
+            self._map: GroundMap | None = GroundMap(results, assembly, map_width, height_px)
+        else:
+            self._map, width_px = None, self._tiling.columns * self._tiling.width_px
         self._chart = _error_chart(results, width_px)
         self._means = {track: results.means(track) for track in results.tracks}
         self._truth = results.true_states()
@@ -131,7 +139,7 @@ class _Scene:
         for index, (name, image) in enumerate(images.items()):
             row, column = divmod(index, tiling.columns)
             self._place(grid, self._picture(name, image, frame), row, column)
-        rows = [np.concatenate([grid, self._map.draw(frame)], axis=1)]
+        rows = [grid if self._map is None else np.concatenate([grid, self._map.draw(frame)], axis=1)]
         if self._chart is not None:
             rows.append(self._chart.draw(frame))
         return np.concatenate(rows)
@@ -182,7 +190,8 @@ def _error_chart(results: Results, width_px: int) -> Chart | None:
         return None
     highest = max(float(np.nanmax(line.values, initial=0.0)) for line in lines) or 1.0
     height, text_px = round(_CHART_SHARE * width_px), text_size(width_px // 2)
-    return Chart("position error / m", lines, 0.0, 1.05 * highest, width_px, height, text_px)
+    unit = results.scenario.target.unit
+    return Chart(f"position error / {unit}", lines, 0.0, 1.05 * highest, width_px, height, text_px)
 
 
 def _write(pictures: list[Image], path: Path, fps: float) -> None:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from sim.pictures.plots import cleaned, log_axis
 from sim.pictures.theme import COLORS, LABELS, MUTED
+from sim.running.results import length
 
 _PLACES = {"dcpf": -0.26, "cpf": 0.0, "single": 0.26}  # of the strips beside a scenario's name
 _BEST_SINGLE = "best single camera"
@@ -33,17 +34,19 @@ def plot_comparison(rows: Sequence[Mapping[str, Any]]) -> Figure:
     """
     if not rows:
         raise ValueError("there are no runs to compare: give at least one summary")
-    names = list(dict.fromkeys(str(row["scenario"]) for row in rows))
+    units = {str(row["scenario"]): str(row.get("unit", "m")) for row in rows}
+    names, unit = list(units), " or ".join(sorted(set(units.values())))
     figure = Figure(figsize=(max(7.0, 1.8 + 1.7 * len(names)), 4.2), layout="constrained")
     axes = cleaned(figure.add_subplot())
     log_axis(axes)
     axes.grid(visible=False, axis="x")
     for place, name in enumerate(names):
         _draw_group(axes, place, [row for row in rows if row["scenario"] == name])
-    axes.set_xticks(range(len(names)), names)
+    mixed = len(set(units.values())) > 1
+    axes.set_xticks(range(len(names)), [f"{name}, in {units[name]}" if mixed else name for name in names])
     axes.set_xlim(-0.6, len(names) - 0.4)
-    axes.set_ylabel("RMSE of the position / m")
-    _draw_legend(figure, axes)
+    axes.set_ylabel(f"RMSE of the position / {unit}")
+    _draw_legend(figure, axes, unit)
     return figure
 
 
@@ -74,23 +77,24 @@ def _draw_strip(
     )
 
 
-def _draw_legend(figure: Figure, axes: Axes) -> None:
+def _draw_legend(figure: Figure, axes: Axes, unit: str) -> None:
     for kind in _PLACES:
         label = _BEST_SINGLE if kind == "single" else LABELS[kind]
         axes.plot([], [], "o", color=COLORS[kind], label=label)
     axes.plot([], [], "x", color=MUTED, label="target lost")
-    axes.plot([], [], color=MUTED, linewidth=2.5, label="median, above in m")
+    axes.plot([], [], color=MUTED, linewidth=2.5, label=f"median, above in {unit}")
     figure.legend(loc="outside lower center", ncols=5, frameon=False, columnspacing=1.2, handletextpad=0.5)
 
 
 def _best_single(run: Mapping[str, Any]) -> str | None:
-    known = {node: value for node, value in run["rmse_m"]["single"].items() if value is not None}
+    known = {node: value for node, value in length(run, "rmse")["single"].items() if value is not None}
     return min(known, key=known.__getitem__, default=None)
 
 
 def _rmse(run: Mapping[str, Any], kind: str) -> float:
     best = _best_single(run)
-    value = run["rmse_m"]["single"].get(best) if kind == "single" else run["rmse_m"][kind]
+    rmse = length(run, "rmse")
+    value = rmse["single"].get(best) if kind == "single" else rmse[kind]
     return np.nan if value is None else value
 
 

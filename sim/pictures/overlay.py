@@ -35,7 +35,7 @@ def draw_frame(
         image: The picture, as the camera gives it.
         camera: The camera.
         target: What is tracked.
-        positions: Where the target is, metres: as this camera's DCPF has it, as CPF has it, in truth; what
+        positions: Where the target is: as this camera's DCPF has it, as CPF has it, in truth; what
             is left out is not drawn.
         frame: Frame of the run.
         width_px: Width of the picture that is wanted.

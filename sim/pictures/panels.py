@@ -39,7 +39,6 @@ _TINTS: dict[Track, str] = {
 }
 _MOST_TICKS = 9
 _DASHES = ("-", "--", ":", "-.")
-_RMSE = "RMSE of the position / m"
 
 
 def draw_error(axes: Axes, groups: Sequence[GroupFindings]) -> None:
@@ -64,7 +63,7 @@ def draw_error(axes: Axes, groups: Sequence[GroupFindings]) -> None:
         axes.set_xticks(numbers, values)
     if not is_number:
         axes.set_xlim(-0.5, len(values) - 0.5)
-    axes.set(xlabel=AXES.get(key, key), ylabel=_RMSE)
+    axes.set(xlabel=AXES.get(key, key), ylabel=_rmse_label(groups))
     log_axis(axes)
 
 
@@ -86,7 +85,7 @@ def draw_paths(axes: Axes, groups: Sequence[GroupFindings]) -> None:
             axes.plot(*(middle + run).T, color=_TINTS[track], linewidth=0.5, alpha=0.5)
         mean = middle + np.ma.masked_invalid(deviation).mean(axis=0).filled(np.nan)
         axes.plot(*mean.T, color=_TINTS[track], linewidth=width, label=_NAMES[track])
-    axes.set(xlabel="x / m", ylabel="y / m")
+    axes.set(xlabel=f"x / {group.unit}", ylabel=f"y / {group.unit}")
     axes.margins(0.08)
 
 
@@ -101,7 +100,7 @@ def draw_frames(axes: Axes, groups: Sequence[GroupFindings]) -> None:
         frames = np.arange(1, errors.shape[2] + 1)
         axes.plot(frames, median, color=_TINTS[track], linewidth=1.6, label=_NAMES[track])
         axes.fill_between(frames, low, high, color=_TINTS[track], alpha=0.2, linewidth=0)
-    axes.set(xlabel="frame", ylabel="position error / m", xlim=(0, group.truth().shape[1] - 1))
+    axes.set(xlabel="frame", ylabel=f"position error / {group.unit}", xlim=(0, group.truth().shape[1] - 1))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     log_axis(axes)
 
@@ -121,7 +120,7 @@ def draw_bytes(axes: Axes, groups: Sequence[GroupFindings]) -> None:
         if name in sent[0]:
             color = _TINTS["coded" if name == "jpeg" else "cpf"]
             _draw_points(axes, np.array([sent[0][name]]), [interval], color, marker, label)
-    axes.set(xlabel="bytes a frame, all cameras", ylabel=_RMSE, xscale="log")
+    axes.set(xlabel="bytes a frame, all cameras", ylabel=_rmse_label(groups), xscale="log")
     log_axis(axes)
 
 
@@ -135,7 +134,7 @@ def draw_time(axes: Axes, groups: Sequence[GroupFindings]) -> None:
             [np.median(group.cpu_ms("cameras")) / len(group.group.scenario_run.cameras) for group in groups]
         )
         _draw_cost(axes, groups, "dcpf", spent, "each camera")
-    axes.set(xlabel="processor time a frame / ms", ylabel=_RMSE)
+    axes.set(xlabel="processor time a frame / ms", ylabel=_rmse_label(groups))
     log_axis(axes)
     axes.set_xlim(left=0)
 
@@ -193,6 +192,10 @@ def _annotate(
             bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5, "alpha": 0.85},
         )  # fmt: skip
     axes.margins(x=0.12, y=0.12)
+
+
+def _rmse_label(groups: Sequence[GroupFindings]) -> str:
+    return f"RMSE of the position / {groups[0].unit}"
 
 
 def _numbers(values: Sequence[str]) -> tuple[Float[np.ndarray, " S"], bool]:

@@ -49,7 +49,8 @@ def plot_errors(results: Results) -> Figure:
     told = np.isfinite(nodes).any(axis=0)
     if told.any():
         _draw_nodes(axes, frames[told], nodes[:, told])
-    axes.set(xlabel="frame", ylabel="position error / m", title=results.scenario.name)
+    unit = results.scenario.target.unit
+    axes.set(xlabel="frame", ylabel=f"position error / {unit}", title=results.scenario.name)
     axes.set_xlim(0, results.scenario.frames - 1)
     log_axis(axes)
     fused = np.concatenate([nodes, _errors(results, "cpf")])

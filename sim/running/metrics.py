@@ -1,6 +1,7 @@
 """How far an estimate was from the truth, and whether it knew.
 
-Everything is in metres unless it has no unit. Frame 0 is the initialisation and does not count.
+Lengths are in the unit of the target's space: metres, or pixels in the image plane. Frame 0 is the
+initialisation and does not count.
 """
 
 import numpy as np
@@ -8,6 +9,9 @@ from jaxtyping import Float
 
 LOST_ERROR = 0.8
 """Mean error of a run's last frames above which the target counts as lost, m."""
+LOST_DIAGONALS = 0.5
+"""The same in the image plane, in diagonals of the target's box: beyond it, an estimate is outside the circle
+around the true box."""
 LOST_FRAMES = 5
 """How many last frames that mean is over."""
 
@@ -26,11 +30,11 @@ def rmse(errors: Float[np.ndarray, "..."]) -> float:
     return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
 
-def is_lost(errors: Float[np.ndarray, " T"]) -> bool:
+def is_lost(errors: Float[np.ndarray, " T"], limit: float = LOST_ERROR) -> bool:
     """Whether the mean error of the last frames says that the target was lost, or nothing is there."""
     last = errors[-LOST_FRAMES:]
     known = last[~np.isnan(last)]
-    return not known.size or float(known.mean()) > LOST_ERROR
+    return not known.size or float(known.mean()) > limit
 
 
 def anees(

@@ -11,7 +11,16 @@ from jaxtyping import Float
 from network.messages import EstimateMessage, StatusMessage, TruthMessage
 from sim.metrics.loss import losses
 from sim.metrics.sets import gospa, ospa
-from sim.running.metrics import LOST_FRAMES, anees, disagreement, is_lost, position_errors, rmse
+from sim.running.metrics import (
+    LOST_DIAGONALS,
+    LOST_ERROR,
+    LOST_FRAMES,
+    anees,
+    disagreement,
+    is_lost,
+    position_errors,
+    rmse,
+)
 from sim.scenario.model import Scenario
 
 Track = tuple[str, str]
@@ -79,9 +88,15 @@ class Results:
         )
 
     def errors(self, track: Track) -> Float[np.ndarray, " T"] | None:
-        """The position error of a track in each frame from 1 on, in metres; None without a truth."""
+        """The position error of a track in each frame from 1 on; None without a truth."""
         truth = self.true_states()
         return None if truth is None else position_errors(self.means(track), truth)[1:]
+
+    @property
+    def lost_error(self) -> float:
+        """Mean error of the last frames above which the target counts as lost, in the target's unit."""
+        size_px = self.scenario.target.size_px
+        return LOST_ERROR if size_px is None else LOST_DIAGONALS * float(np.hypot(*size_px))
 
     def of(self, estimator: str) -> dict[str, Track]:
         """The tracks of an estimator by node, sorted by node."""
@@ -96,7 +111,8 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
         processes: How many processes it took.
 
     Returns:
-        Plain data; figures that cannot be known, as errors without a truth, are None.
+        Plain data; figures that cannot be known, as errors without a truth, are None. What is in metres is
+        None in the image plane, and stands beside it in pixels.
     """
     scenario = results.scenario
     dcpf, single = results.of("dcpf"), results.of("single")
@@ -106,6 +122,18 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
     all_nodes = [e for track in dcpf.values() if (e := errors[track]) is not None]
     total = _rmse(np.concatenate(all_nodes)) if all_nodes else None
     central = _rmse(errors[cpf]) if cpf else None
+    lengths = {
+        "rmse": {
+            "dcpf": total,
+            "cpf": central,
+            "single": {node: _rmse(errors[track]) for node, track in single.items()},
+            "dcpf_per_node": per_node,
+        },
+        "disagreement": _number(disagreement(np.array([results.means(t)[1:] for t in dcpf.values()])))
+        if dcpf
+        else None,
+    }
+    limit = results.lost_error
     return {
         "scenario": scenario.name,
         "preset": scenario.preset,
@@ -113,21 +141,14 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
         "frames": scenario.frames,
         "cameras": [camera.name for camera in scenario.cameras],
         "processes": processes,
-        "rmse_m": {
-            "dcpf": total,
-            "cpf": central,
-            "single": {node: _rmse(errors[track]) for node, track in single.items()},
-            "dcpf_per_node": per_node,
-        },
+        "unit": scenario.target.unit,
+        **in_unit(lengths, scenario.target.unit),
         "ratio_dcpf_cpf": _number(total / central) if total is not None and central else None,
         "lost": {
-            "dcpf": _any_lost([errors[track] for track in dcpf.values()]),
-            "cpf": _any_lost([errors[cpf]]) if cpf else None,
-            "single": {node: _any_lost([errors[track]]) for node, track in single.items()},
+            "dcpf": _any_lost([errors[track] for track in dcpf.values()], limit),
+            "cpf": _any_lost([errors[cpf]], limit) if cpf else None,
+            "single": {node: _any_lost([errors[track]], limit) for node, track in single.items()},
         },
-        "disagreement_m": _number(disagreement(np.array([results.means(t)[1:] for t in dcpf.values()])))
-        if dcpf
-        else None,
         "anees": {
             "dcpf": _anees(results, list(dcpf.values())),
             "cpf": _anees(results, [cpf] if cpf else []),
@@ -142,6 +163,22 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
     }
 
 
+def in_unit(lengths: Mapping[str, Any], unit: str) -> dict[str, Any]:
+    """Lengths by name and unit; the keys in metres are always there."""
+    unknown = {f"{name}_m": None for name in lengths}
+    return {**unknown, **{f"{name}_{unit}": value for name, value in lengths.items()}}
+
+
+def length(figures: Mapping[str, Any], name: str) -> Any:
+    """A length of a summary, or of a comparison of summaries, in the unit that it has.
+
+    Args:
+        figures: The summary.
+        name: `rmse` or `disagreement`.
+    """
+    return figures[f"{name}_{figures.get('unit', 'm')}"]
+
+
 def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
@@ -150,11 +187,11 @@ def _rmse(errors: Float[np.ndarray, " T"] | None) -> float | None:
     return None if errors is None else _number(rmse(errors))
 
 
-def _any_lost(errors: list[Float[np.ndarray, " T"] | None]) -> bool | None:
+def _any_lost(errors: list[Float[np.ndarray, " T"] | None], limit: float) -> bool | None:
     known = [e for e in errors if e is not None]
     # A node that died on the way has not lost the target, unless nobody is left who knows where it is.
     to_the_end = [e for e in known if not np.isnan(e[-LOST_FRAMES:]).all()]
-    return any(is_lost(e) for e in to_the_end or known) if known else None
+    return any(is_lost(e, limit) for e in to_the_end or known) if known else None
 
 
 def _anees(results: Results, tracks: list[Track]) -> float | None:
@@ -168,14 +205,21 @@ def _anees(results: Results, tracks: list[Track]) -> float | None:
 
 def _tracking(results: Results, tracks: list[Track]) -> dict[str, float | None] | None:
     """The mean OSPA and GOSPA of an estimator's nodes, its losses of the target, and how long they lasted."""
-    known = [e for track in tracks if (e := results.errors(track)) is not None]
-    if not known:
+    truth = results.true_states()
+    if truth is None or not tracks:
         return None
-    each = [loss for errors in known for loss in losses(errors)]
+    # Where nobody knows the truth, there is nothing to be far from.
+    there = np.isfinite(truth[1:]).all(axis=1)
+    known = [position_errors(results.means(track), truth)[1:][there] for track in tracks]
+    cutoff = results.lost_error
+    each = [loss for errors in known for loss in losses(errors, cutoff)]
     found_after = [loss.found - loss.first for loss in each if loss.found is not None]
+    lengths = {
+        "ospa": float(np.mean([ospa(errors, cutoff) for errors in known])),
+        "gospa": float(np.sqrt(np.mean([gospa(errors, cutoff) ** 2 for errors in known]))),
+    }
     return {
-        "ospa_m": float(np.mean([ospa(errors) for errors in known])),
-        "gospa_m": float(np.sqrt(np.mean([gospa(errors) ** 2 for errors in known]))),
+        **in_unit(lengths, results.scenario.target.unit),
         "losses_per_node": len(each) / len(known),
         "reacquired_after_s": float(np.mean(found_after)) / results.scenario.rate_hz if found_after else None,
     }

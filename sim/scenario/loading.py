@@ -87,12 +87,28 @@ def _resolve(scenario: Scenario, folder: Path) -> Scenario:
     for options in scenario.cameras:
         video = place / _video(options)
         digest = _digest(video, options)
-        # A video may be narrower than its calibration: cropped on the right, the intrinsics hold.
-        camera = cropped(_calibrated(options, folder, listed), *VideoSource(video).size_px)
+        size_px = VideoSource(video).size_px
+        if scenario.target.space == "image" and _is_uncalibrated(options, listed):
+            camera = _nominal(options.name, size_px)
+        else:
+            # A video may be narrower than its calibration: cropped on the right, the intrinsics hold.
+            camera = cropped(_calibrated(options, folder, listed), *size_px)
         resolved.append(_as_options(camera).model_copy(update={"video": str(video), "video_sha256": digest}))
     truth = footage.ground_truth and str((folder / footage.ground_truth).resolve())
     known = footage.model_copy(update={"calibration": None, "ground_truth": truth})
     return scenario.model_copy(update={"cameras": tuple(resolved), "footage": known})
+
+
+def _is_uncalibrated(options: CameraOptions, listed: Mapping[str, Camera]) -> bool:
+    own = options.calibration or options.position or options.K
+    return own is None and options.name not in listed
+
+
+def _nominal(name: str, size_px: tuple[int, int]) -> Camera:
+    """A camera of these pictures whose place nobody needs to know: the target is tracked in its pixels."""
+    width, height = size_px
+    K = np.array([[width, 0, (width - 1) / 2], [0, width, (height - 1) / 2], [0, 0, 1.0]])
+    return Camera(name, width, height, K, np.eye(3), np.zeros(3), np.zeros(5))
 
 
 def _calibrated(options: CameraOptions, folder: Path, listed: Mapping[str, Camera]) -> Camera:

@@ -176,20 +176,47 @@ class Scenario(Options):
     @model_validator(mode="after")
     def _target(self) -> "Scenario":
         target = self.target
+        if target.space == "image" and len(self.cameras) > 1:
+            raise ValueError(
+                f"target.space is image, the pixels of one camera, and there are {len(self.cameras)} cameras:"
+                " keep one, or track on a plane or in a volume"
+            )
+        dynamics = self.filter.dynamics
+        if target.n_axes != 2 and (isinstance(dynamics.A, tuple) or isinstance(dynamics.B, tuple)):
+            raise ValueError("filter.dynamics.A or B is 2 x 2, and a volume has three axes: give a number")
         if self.world is not None:
-            people = [person.name for person in self.world.people]
-            if target.person not in people:
-                raise ValueError(
-                    f"target.person is {target.person}, who is not in world.people:"
-                    f" name one of {', '.join(people)}"
-                )
+            self._require_in_world(self.world)
         for key, vector in (("velocity", target.start.velocity), ("position", target.start.position)):
             if vector != "truth" and len(vector) != target.n_axes:
                 raise ValueError(
-                    f"target.start.{key} has {len(vector)} numbers: a target in a {target.space} needs"
+                    f"target.start.{key} has {len(vector)} numbers: a target {SPACES[target.space]} needs"
                     f" {target.n_axes}"
                 )
         return self
+
+    def _require_in_world(self, world: WorldOptions) -> None:
+        target = self.target
+        if target.person is not None and target.object is not None:
+            raise ValueError(
+                f"target names the person {target.person} and the object {target.object}: set one to null"
+            )
+        if target.person is None and target.object is None:
+            there = [person.name for person in world.people] + [each.name for each in world.objects]
+            raise ValueError(
+                f"target needs a person or an object of the world: name one of {', '.join(there)}"
+            )
+        if target.object is None:
+            key, group, known = "person", "people", [person.name for person in world.people]
+        else:
+            key, group, known = "object", "objects", [each.name for each in world.objects]
+        name = getattr(target, key)
+        if name not in known:
+            raise ValueError(
+                f"target.{key} is {name}, who is not in world.{group}: name one of {', '.join(known)}"
+            )
+        if target.part != "body" and (target.object is not None or target.space == "plane"):
+            of_what = "a target on a plane" if target.space == "plane" else "an object"
+            raise ValueError(f"target.part is {target.part}: {of_what} has no parts, leave it out")
 
     @model_validator(mode="after")
     def _network(self) -> "Scenario":
@@ -211,6 +238,9 @@ class Scenario(Options):
         """Processes of a run: cameras, the central node if there is one, and the router."""
         return len(self.cameras) + self.baselines.cpf + 1
 
+
+SPACES = {"plane": "on a plane", "volume": "in a volume", "image": "in the image plane"}
+"""Where a target is, in words."""
 
 GRAPHS = {"ring": ring, "path": path, "star": star, "complete": complete, "grid": grid}
 """The graphs that a scenario can name."""

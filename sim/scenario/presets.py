@@ -44,6 +44,18 @@ ROBUST: Mapping[str, Any] = {
 }
 """Joint colours without the camera's gain, a likelihood set from the background, net information."""
 
+ONE_CAMERA: Mapping[str, Any] = {
+    "target": {"start": {"position_error": 1.0, "position_deviation": 2.0, "velocity_deviation": 30.0}},
+    "filter": {"dynamics": {"position_variance": 16.0, "velocity_variance": 900.0}},
+}
+"""What both presets begin with in the image plane, in pixels."""
+
+ONE_CAMERA_PAPER: Mapping[str, Any] = {
+    "filter": {"likelihood": {"form": "literal"}, "resampling": {"threshold": 1.0}},
+}
+"""Medeiros et al. and Truong & Kim: a Gaussian in the distance, whatever the camera sees, and resampling in
+every frame."""
+
 SMALLEST_PERSON = 0.8
 """Height in m from which a target on a plane is taken for a person."""
 PERSON_PARTS: Mapping[str, Any] = {
@@ -63,8 +75,13 @@ def preset_defaults(data: Mapping[str, Any]) -> Mapping[str, Any]:
         data: The scenario as its author wrote it.
     """
     name = data.get("preset", "robust")
+    target = data.get("target")
     defaults = PAPER if name == "paper" else ROBUST
-    if name == "robust" and _is_person(data.get("target")):
+    if isinstance(target, Mapping) and target.get("space") == "image":
+        defaults = _merged(defaults, ONE_CAMERA)
+        if name == "paper":
+            defaults = _merged(defaults, ONE_CAMERA_PAPER)
+    elif name == "robust" and _is_person(target):
         defaults = _merged(defaults, PERSON_PARTS)
     network = data.get("network")
     consensus = network.get("consensus") if isinstance(network, Mapping) else None

@@ -107,7 +107,7 @@ def _end_slope(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wander:
-    """A smooth random deviation in the plane: a sum of slow sinusoids.
+    """A smooth random deviation: a sum of slow sinusoids on each axis.
 
     Attributes:
         amplitude_m: Of every sinusoid.
@@ -116,23 +116,23 @@ class Wander:
     """
 
     amplitude_m: float
-    frequencies: Float[np.ndarray, "M 2"]
-    phases: Float[np.ndarray, "M 2"]
+    frequencies: Float[np.ndarray, "M A"]
+    phases: Float[np.ndarray, "M A"]
 
-    def at(self, time_s: float) -> Float[np.ndarray, " 2"]:
+    def at(self, time_s: float) -> Float[np.ndarray, " A"]:
         """The deviation, metres."""
         return self.amplitude_m * np.sin(self.frequencies * time_s + self.phases).sum(axis=0)
 
-    def derivative_at(self, time_s: float) -> Float[np.ndarray, " 2"]:
+    def derivative_at(self, time_s: float) -> Float[np.ndarray, " A"]:
         """Its velocity, metres a second."""
         angles = self.frequencies * time_s + self.phases
         return self.amplitude_m * (self.frequencies * np.cos(angles)).sum(axis=0)
 
 
-def wander(deviation_m: float, rng: np.random.Generator) -> Wander:
+def wander(deviation_m: float, rng: np.random.Generator, n_axes: int = 2) -> Wander:
     """A deviation of a given standard deviation along each axis, with periods of 3 to 10 seconds."""
     n_sinusoids = 4
-    frequencies = 2 * np.pi * rng.uniform(0.1, 0.33, (n_sinusoids, 2))
-    phases = rng.uniform(0.0, 2 * np.pi, (n_sinusoids, 2))
+    frequencies = 2 * np.pi * rng.uniform(0.1, 0.33, (n_sinusoids, n_axes))
+    phases = rng.uniform(0.0, 2 * np.pi, (n_sinusoids, n_axes))
     # n sinusoids of amplitude a and random phase have the variance n a²/2
     return Wander(deviation_m * np.sqrt(2 / n_sinusoids), frequencies, phases)

@@ -37,6 +37,9 @@ _LEG = (
     (0.485, 0.046, 0.056, 0.000),
 )  # fmt: skip
 _HEAD_JOINTS, _TORSO_JOINTS, _ARM_JOINTS, _LEG_JOINTS = (0, 1, 3, 5), (0, 2, 4), (0, 1, 3), (0, 1, 2, 3)
+_HEAD_FACES = 6 * (len(_HEAD_JOINTS) - 1)  # the first of a body's
+HEAD_MIDDLE = (_HEAD[0][0] + _HEAD[-1][0]) / 2
+"""Height of the middle of the head as a fraction of the person's."""
 _SHOULDER, _HIP, _WRIST, _KNEE, _ANKLE = 0.82, 0.485, 0.48, 0.27, 0.036
 _STEP = 0.19  # a foot swings this far forwards and back
 _REACH = 0.09  # and a hand this far
@@ -165,6 +168,12 @@ def figures(poses: Sequence[Pose], palettes: Sequence[Float[np.ndarray, "5 3"]])
     normals = _BODY.normals @ axes
     colors = np.array(palettes)[:, _BODY.paint] * _BODY.tone[:, None]
     return Solids(vertices, _BODY.faces, normals, colors)
+
+
+def heads(bodies: Solids) -> Solids:
+    """The heads of some bodies."""
+    part = np.s_[:, :_HEAD_FACES]
+    return Solids(bodies.vertices, bodies.faces[:_HEAD_FACES], bodies.normals[part], bodies.colors[part])
 
 
 def _axes(heading: float) -> list[list[float]]:

@@ -54,6 +54,8 @@ class PersonOptions(Options):
     the seed, so that no two runs are alike."""
     height: Height | Annotated[tuple[HeightOptions, ...], Field(min_length=1)] = 1.75
     """Floor to top of the head, metres; or a list of heights over time, for a person who crouches."""
+    facing: tuple[Metres, Metres] | None = None
+    """Point that they keep facing, x and y on the floor, metres; null: they face the way they walk."""
     upper: Color = "#6e6e73"
     """Colour of the upper body's clothes."""
     lower: Color = "#2d2d3c"
@@ -161,6 +163,9 @@ def build_person(options: PersonOptions, seed: int) -> Person:
     palette = [bgr(options.skin), bgr(options.hair), bgr(options.upper), lower, 20 + 0.4 * lower]
     rng = stream(seed, "world", options.name)
     track_s, headings, distances = _track(path)
+    if options.facing is not None:
+        to_point = np.array(options.facing) - [path.at(t) for t in track_s.tolist()]
+        headings = np.unwrap(np.arctan2(to_point[:, 1], to_point[:, 0]))
     start = rng.uniform(0.0, _STRIDE * 2)  # so that no two people walk in step
     return Person(
         name=options.name,

@@ -1,11 +1,10 @@
 """A camera's pictures of the simulated world.
 
-What does not move (the room, the occluders) is drawn once. People are then laid over it, far to near, each
-cut out where an occluder in front of them hides them; the sensor's noise comes last.
+What does not move (the room, the occluders) is drawn once. People and objects are then laid over it, far to
+near, each cut out where an occluder in front of them hides them; the sensor's noise comes last.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -18,12 +17,12 @@ from sim.world.figure import figures
 from sim.world.light import Sensor, gain_at
 from sim.world.mesh import Box, View, clip, coverage, draw, is_empty, union, views
 from sim.world.occluders import Occluder
-from sim.world.people import Pose
-from sim.world.shadow import Shadow, shadows
+from sim.world.shadow import NO_SHADOW, OBJECT_RADIUS, PERSON_RADIUS, Shadow, shadows
 from sim.world.world import World
 
 Picture = UInt8[np.ndarray, "H W 3"]
 _FALLOFF = 0.16  # a lens gives this much less light in the picture's corners
+_STANDING_M = 0.01  # an object this near to the floor stands on it, and casts a shadow there
 _ALL = 255  # coverage of a pixel that is wholly covered
 
 
@@ -34,6 +33,15 @@ class _Cover:
     occluder: Occluder
     box: Box
     coverage: UInt8[np.ndarray, "H W"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Thing:
+    """A person or an object: where it is above the floor, and what the camera sees of it and its shadow."""
+
+    place: Float[np.ndarray, " 2"]
+    body: View
+    shadow: Shadow
 
 
 class Renderer:
@@ -71,19 +79,36 @@ class Renderer:
         """
         gain = gain_at(self._world.light, time_s) * self._sensor.gain
         picture = self._lit_scene(gain).copy()
-        people = self._world.people
-        if people:
-            poses = [person.pose_at(time_s) for person in people]
-            bodies = views(figures(poses, [person.palette for person in people]), self._camera)
-            darker = shadows(poses, self._camera)
-            for i in self._far_to_near(poses):
-                self._draw_person(picture, poses[i].position, bodies[i], darker[i], gain)
+        viewer = self._camera.center[:2].tolist()
+        # far to near
+        for thing in sorted(
+            [*self._people(time_s), *self._objects(time_s)],
+            key=lambda thing: -math.dist(thing.place.tolist(), viewer),
+        ):
+            self._draw_thing(picture, thing, gain)
         return self._sensor.read_out(picture, index)
 
-    def _far_to_near(self, poses: Sequence[Pose]) -> list[int]:
-        """The order in which people are drawn."""
-        viewer = self._camera.center[:2].tolist()
-        return sorted(range(len(poses)), key=lambda i: -math.dist(poses[i].position.tolist(), viewer))
+    def _people(self, time_s: float) -> list[_Thing]:
+        people = self._world.people
+        if not people:
+            return []
+        poses = [person.pose_at(time_s) for person in people]
+        places = [pose.position for pose in poses]
+        bodies = views(figures(poses, [person.palette for person in people]), self._camera)
+        radii = PERSON_RADIUS * np.array([pose.stature for pose in poses])
+        return list(map(_Thing, places, bodies, shadows(places, radii, self._camera)))
+
+    def _objects(self, time_s: float) -> list[_Thing]:
+        things = []
+        for prop in self._world.objects:
+            position, _ = self._world.underside(prop.name, time_s)
+            (body,) = views(prop.at(position), self._camera)
+            shadow = NO_SHADOW
+            if position[2] < _STANDING_M:
+                radius = OBJECT_RADIUS * prop.radius
+                (shadow,) = shadows([position[:2]], np.array([radius]), self._camera)
+            things.append(_Thing(position[:2], body, shadow))
+        return things
 
     def _lit_scene(self, gain: Float[np.ndarray, " 3"]) -> Picture:
         """What does not move, under a light; kept as long as the light stays the same."""
@@ -106,20 +131,14 @@ class Renderer:
             covers.append(_Cover(occluder, box, coverage(seen, box)))
         return covers
 
-    def _draw_person(
-        self,
-        picture: Picture,
-        point: Float[np.ndarray, " 2"],
-        body: View,
-        shadow: Shadow,
-        gain: Float[np.ndarray, " 3"],
-    ) -> None:
-        """Lays a person into a picture, except where something in front hides them."""
+    def _draw_thing(self, picture: Picture, thing: _Thing, gain: Float[np.ndarray, " 3"]) -> None:
+        """Lays a person or an object into a picture, except where an occluder in front hides it."""
+        body, shadow = thing.body, thing.shadow
         body_box, shadow_box = clip(body.box, self._limits), clip(shadow.box, self._limits)
         box = union(body_box, shadow_box)
         if is_empty(box):
             return
-        hidden = self._hidden(point, box)
+        hidden = self._hidden(thing.place, box)
         if hidden is not None and hidden.min() == _ALL:
             return
         part = _part(picture, box)

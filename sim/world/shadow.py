@@ -1,4 +1,4 @@
-"""The soft shadow on the floor below a person."""
+"""The soft shadow on the floor below a person, or below an object that stands on it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,9 +9,11 @@ from jaxtyping import Float, UInt8
 
 from nodes.camera import Camera
 from sim.world.mesh import Box, box_around, fill
-from sim.world.people import Pose
 
-_RADIUS = 0.30  # the floor is darker this far around, as a fraction of the stature
+PERSON_RADIUS = 0.30
+"""The floor is darker this far around a person, as a fraction of the stature."""
+OBJECT_RADIUS = 2.5
+"""And this far around an object, in radii."""
 _ANGLES = np.linspace(0, 2 * np.pi, 12, endpoint=False)
 _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), np.zeros(len(_ANGLES))], axis=1)
 _NEAREST_M = 0.1
@@ -42,14 +44,25 @@ class Shadow:
         cv2.multiply(picture, cv2.cvtColor(light, cv2.COLOR_GRAY2BGR), dst=picture, scale=1 / 255)
 
 
-def shadows(poses: Sequence[Pose], camera: Camera) -> list[Shadow]:
-    """The shadow of each person, darkest between the feet; there is at least one."""
-    spots = np.array([(*pose.position.tolist(), 0.0) for pose in poses])
-    radii = _RADIUS * np.array([pose.stature for pose in poses])
+NO_SHADOW = Shadow(np.empty((0, len(_CIRCLE), 2)))
+"""That of what is in the air."""
+
+
+def shadows(
+    places: Sequence[Float[np.ndarray, " 2"]], radii: Float[np.ndarray, " n"], camera: Camera
+) -> list[Shadow]:
+    """Shadows, darkest in their middles.
+
+    Args:
+        places: Their middles on the floor, metres; at least one.
+        radii: How far each reaches, metres.
+        camera: The camera.
+    """
+    spots = np.array([(*place.tolist(), 0.0) for place in places])
     points = spots[:, None] + radii[:, None, None] * _CIRCLE
     pixels, depths = camera.project(points.reshape(-1, 3))
-    rims = pixels.reshape(len(poses), len(_CIRCLE), 2)
-    nearest, centers = depths.reshape(len(poses), -1).min(axis=1), rims.mean(axis=1)
+    rims = pixels.reshape(len(spots), len(_CIRCLE), 2)
+    nearest, centers = depths.reshape(len(spots), -1).min(axis=1), rims.mean(axis=1)
     # what the lens cannot picture is NaN, and so is any mean over it
     whole = (nearest > _NEAREST_M) & np.isfinite(centers[:, 0])
     centers = centers[:, None]

@@ -1,45 +1,46 @@
-"""Ground truth of visibility: how much of a person a camera sees, from the shapes that it draws."""
+"""Ground truth of visibility: how much of a person or object a camera sees, from the shapes that it draws."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from nodes.camera import Camera
-from sim.world.figure import figures
-from sim.world.mesh import View, clip, is_empty, silhouette, views
-from sim.world.world import World
+from sim.world.figure import figures, heads
+from sim.world.mesh import Solids, View, clip, is_empty, silhouette, views
+from sim.world.world import Part, World
 
 _LARGEST_PX = 256  # silhouettes are compared at this size at most
 
 
 @dataclass(frozen=True, slots=True)
 class Visibility:
-    """How much of a person a camera sees.
+    """How much of a person or object a camera sees.
 
     Attributes:
         in_view: The fraction of the whole silhouette that lies inside the picture.
-        occluded: The fraction of that part that other people and occluders hide; 0 if nothing is in view.
+        occluded: The fraction of that part that others and occluders hide; 0 if nothing is in view.
     """
 
     in_view: float
     occluded: float
 
 
-def visibility(world: World, camera: Camera, name: str, time_s: float) -> Visibility:
-    """How much of a person a camera sees.
+def visibility(world: World, camera: Camera, name: str, time_s: float, part: Part = "body") -> Visibility:
+    """How much of a person or object a camera sees.
 
     Args:
         world: The world.
         camera: The camera.
-        name: The person.
+        name: The person or object.
         time_s: When, seconds since the run's first frame.
+        part: What of a person; their own body does not hide their head.
 
     Raises:
-        ValueError: Nobody in the world is called so.
+        ValueError: Nothing and nobody in the world is called so.
     """
-    person = world.person(name)
-    (seen,) = views(figures([person.pose_at(time_s)], [person.palette]), camera)
+    (seen,) = views(_solid(world, name, time_s, part), camera)
     box = seen.box
     shown = clip(box, (0, 0, camera.width_px, camera.height_px))
     if is_empty(shown):
@@ -58,10 +59,23 @@ def visibility(world: World, camera: Camera, name: str, time_s: float) -> Visibi
     return Visibility(in_view, 1 - cv2.countNonZero(inside) / n_inside)
 
 
+def _solid(world: World, name: str, time_s: float, part: Part) -> Solids:
+    prop = next((each for each in world.objects if each.name == name), None)
+    if prop is not None:
+        return prop.at(world.underside(name, time_s)[0])
+    body = _bodies(world, [name], time_s)
+    return heads(body) if part == "head" else body
+
+
+def _bodies(world: World, names: Sequence[str], time_s: float) -> Solids:
+    people = [world.person(name) for name in names]
+    return figures([person.pose_at(time_s) for person in people], [person.palette for person in people])
+
+
 def _in_front(world: World, camera: Camera, name: str, time_s: float) -> list[View]:
-    """Everything that is drawn over a person."""
+    """Everything that is drawn over a person or object."""
     viewer = camera.center[:2]
-    position = world.position(name, time_s)
+    position = world.underside(name, time_s)[0, :2]
     distance = np.linalg.norm(position - viewer)
     occluders = [
         view
@@ -69,11 +83,16 @@ def _in_front(world: World, camera: Camera, name: str, time_s: float) -> list[Vi
         if occluder.may_hide(position, viewer)
         for view in views(occluder.solid, camera)
     ]
-    others = [(other.pose_at(time_s), other.palette) for other in world.people if other.name != name]
     nearer = [
-        (pose, palette) for pose, palette in others if np.linalg.norm(pose.position - viewer) < distance
+        other.name
+        for other in world.people
+        if other.name != name and np.linalg.norm(other.position_at(time_s) - viewer) < distance
     ]
-    if not nearer:
-        return occluders
-    bodies = figures([pose for pose, _ in nearer], [palette for _, palette in nearer])
-    return occluders + views(bodies, camera)
+    props = [
+        view
+        for other in world.objects
+        if other.name != name
+        and np.linalg.norm(world.underside(other.name, time_s)[0, :2] - viewer) < distance
+        for view in views(other.at(world.underside(other.name, time_s)[0]), camera)
+    ]
+    return occluders + props + (views(_bodies(world, nearer, time_s), camera) if nearer else [])

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -11,13 +11,18 @@ from pydantic import Field, model_validator
 from network.options import Options
 from network.streams import stream
 from sim.world.curves import Curve
+from sim.world.figure import HEAD_MIDDLE
 from sim.world.floor import FloorOptions
 from sim.world.interior import Interior, draw_interior
 from sim.world.light import LightingOptions, build_light
+from sim.world.objects import ObjectOptions, Prop, build_object
 from sim.world.occluders import Occluder, OccluderOptions, build_occluder
 from sim.world.people import Person, PersonOptions, build_person
 from sim.world.room import RoomOptions
 from sim.world.walls import WallsOptions
+
+Part = Literal["body", "head"]
+"""What of a person is meant; an object is one part."""
 
 
 class WorldOptions(Options):
@@ -25,6 +30,8 @@ class WorldOptions(Options):
 
     people: tuple[PersonOptions, ...] = ()
     """Who walks about."""
+    objects: tuple[ObjectOptions, ...] = ()
+    """What else stands or moves about."""
     occluders: tuple[OccluderOptions, ...] = ()
     """What stands or hangs between them and the cameras."""
     lighting: LightingOptions = LightingOptions()
@@ -40,10 +47,24 @@ class WorldOptions(Options):
 
     @model_validator(mode="after")
     def _names_differ(self) -> "WorldOptions":
-        names = [person.name for person in self.people]
+        names = [person.name for person in self.people] + [each.name for each in self.objects]
         for name in names:
             if names.count(name) > 1:
-                raise ValueError(f"{names.count(name)} people are called {name}: give each their own name")
+                raise ValueError(
+                    f"{names.count(name)} people or objects are called {name}: give each a name of its own"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _objects_are_attached_to_what_is_there(self) -> "WorldOptions":
+        known = [person.name for person in self.people]
+        for each in self.objects:
+            if each.attached_to is not None and each.attached_to not in known:
+                raise ValueError(
+                    f"object {each.name} is attached_to {each.attached_to}, who is neither a person nor an"
+                    f" object listed before: name one of {', '.join(known) or 'these, once there are any'}"
+                )
+            known.append(each.name)
         return self
 
 
@@ -55,6 +76,7 @@ class World:
         options: What the world was built from.
         seed: The run's seed.
         people: Who walks about.
+        objects: What else stands or moves about.
         occluders: What hides them.
         light: Brightness and colour temperature over time.
     """
@@ -62,6 +84,7 @@ class World:
     options: WorldOptions
     seed: int
     people: tuple[Person, ...]
+    objects: tuple[Prop, ...]
     occluders: tuple[Occluder, ...]
     light: Curve
 
@@ -76,6 +99,45 @@ class World:
                 return person
         known = ", ".join(person.name for person in self.people) or "nobody"
         raise ValueError(f"nobody in world.people is called {name}: there is {known}")
+
+    def underside(self, name: str, time_s: float) -> Float[np.ndarray, "2 3"]:
+        """Where somebody or something stands, and how fast that moves.
+
+        Args:
+            name: Of a person or an object.
+            time_s: When, seconds since the run's first frame.
+
+        Returns:
+            The point on the floor below a person, or the middle of an object's underside, metres; and its
+            velocity, metres a second.
+
+        Raises:
+            ValueError: Nothing and nobody is called so.
+        """
+        prop = next((each for each in self.objects if each.name == name), None)
+        if prop is None:
+            person = self.person(name)
+            return np.array([[*person.position_at(time_s), 0.0], [*person.velocity_at(time_s), 0.0]])
+        own = np.array(
+            [
+                prop.path.at(time_s) + prop.wander.at(time_s),
+                prop.path.derivative_at(time_s) + prop.wander.derivative_at(time_s),
+            ]
+        )
+        return own if prop.attached_to is None else own + self.underside(prop.attached_to, time_s)
+
+    def middle(self, name: str, part: Part, time_s: float) -> Float[np.ndarray, "2 3"]:
+        """The middle of an object, or of a person's body or head, and its velocity, as in `underside`."""
+        prop = next((each for each in self.objects if each.name == name), None)
+        if prop is None:
+            share = HEAD_MIDDLE if part == "head" else 0.5
+            tall = self.person(name).height
+            rise = share * np.array([tall.at(time_s)[0], tall.derivative_at(time_s)[0]])
+        else:
+            rise = np.array([prop.height / 2, 0.0])
+        moved = self.underside(name, time_s)
+        moved[:, 2] += rise
+        return moved
 
     def position(self, name: str, time_s: float) -> Float[np.ndarray, " 2"]:
         """Point on the floor below a person, metres."""
@@ -104,6 +166,7 @@ def build_world(options: WorldOptions, seed: int) -> World:
         options=options,
         seed=seed,
         people=tuple(build_person(each, seed) for each in options.people),
+        objects=tuple(build_object(each, seed) for each in options.objects),
         occluders=tuple(build_occluder(each) for each in options.occluders),
         light=build_light(options.lighting),
     )

@@ -4,7 +4,7 @@ import pytest
 
 from network.weights import ConstantWeights, MetropolisWeights
 from sim.scenario.loading import load_scenario
-from sim.scenario.presets import PAPER, PERSON_PARTS, ROBUST, preset_defaults
+from sim.scenario.presets import ONE_CAMERA, PAPER, PERSON_PARTS, ROBUST, preset_defaults
 
 CONSTANT = ("network.consensus", "{algorithm: constant, epsilon: 0.2}")
 
@@ -61,6 +61,19 @@ def test_only_a_person_has_head_torso_and_legs():
     assert preset_defaults({})["filter"]["color"]["parts"] == PERSON_PARTS["filter"]["color"]["parts"]
     assert preset_defaults({"target": {"space": "volume"}}) == ROBUST
     assert preset_defaults({"preset": "paper"}) == PAPER
+
+
+@pytest.mark.parametrize("preset", ["paper", "robust"])
+def test_in_the_image_plane_both_presets_begin_with_pixels_and_a_person_is_one_part(preset):
+    data = {"preset": preset, "target": {"space": "image"}}
+    filled = preset_defaults(data)
+
+    assert filled["target"] == ONE_CAMERA["target"]
+    assert filled["filter"]["dynamics"] == ONE_CAMERA["filter"]["dynamics"]
+    assert filled["filter"]["color"].get("parts", [1.0]) == [1.0]
+    # the papers' trackers: a Gaussian in the distance, resampling in every frame
+    literal = filled["filter"]["likelihood"].get("form") == "literal"
+    assert literal == (filled["filter"].get("resampling") == {"threshold": 1.0}) == (preset == "paper")
 
 
 @pytest.mark.parametrize("broken", [{"preset": 3}, {"preset": "none"}, {"target": []}, {"network": "ring"}])

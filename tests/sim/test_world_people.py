@@ -88,5 +88,5 @@ def test_a_world_knows_its_people_by_name():
     assert world.height("anna", 0.0) == 1.75
     with pytest.raises(ValueError, match="called bob: there is anna"):
         world.person("bob")
-    with pytest.raises(ValidationError, match="2 people are called anna"):
+    with pytest.raises(ValidationError, match="2 people or objects are called anna"):
         WorldOptions.model_validate({"people": [ANNA, ANNA]})

@@ -58,14 +58,14 @@ def _measure(claim: Claim, groups: Sequence[GroupFindings]) -> tuple[bool, str]:
 
 
 def _flat(groups: Sequence[GroupFindings]) -> tuple[bool, str]:
-    key = groups[0].group.settings[0][0]
+    key, unit = groups[0].group.settings[0][0], groups[0].unit
     ours = _range([float(group.rmse("dcpf").mean()) for group in groups])
     best = _range([float(group.rmse("single").mean()) for group in groups])
     each = np.array([group.node_rmse("single").mean(axis=0) for group in groups])
     single = float(np.mean(each.max(axis=0) - each.min(axis=0)))
     text = (
-        f"over {key}, DCPF's mean RMSE changes by {ours:.3f} m, a single camera's by {single:.3f} m in the"
-        f" mean (the best one's by {best:.3f} m)."
+        f"over {key}, DCPF's mean RMSE changes by {ours:.3f} {unit}, a single camera's by {single:.3f} {unit}"
+        f" in the mean (the best one's by {best:.3f} {unit})."
     )
     return ours <= FLAT * single, text
 
@@ -87,12 +87,12 @@ def _within(groups: Sequence[GroupFindings], claim: WithinClaim) -> tuple[bool, 
 
 
 def _noisier(groups: Sequence[GroupFindings]) -> tuple[bool, str]:
-    key = groups[0].group.settings[1][0]
+    key, unit = groups[0].group.settings[1][0], groups[0].unit
     few, *_, many = list(dict.fromkeys(group.settings[key] for group in groups))
     deviation = {value: _deviation(groups, key, value, "dcpf") for value in (few, many)}
     text = (
-        f"DCPF's RMSE deviates from run to run by {deviation[few]:.4f} m with {key} = {few}, by"
-        f" {deviation[many]:.4f} m with {many}."
+        f"DCPF's RMSE deviates from run to run by {deviation[few]:.4f} {unit} with {key} = {few}, by"
+        f" {deviation[many]:.4f} {unit} with {many}."
     )
     return deviation[few] > deviation[many], text
 

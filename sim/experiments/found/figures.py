@@ -8,6 +8,7 @@ import numpy as np
 
 from sim.metrics.consistency import anees_band
 from sim.metrics.intervals import mean_interval
+from sim.running.results import in_unit, length
 
 _ESTIMATORS = ("dcpf", "cpf", "best_single")
 
@@ -20,29 +21,34 @@ def compare(runs: Sequence[Mapping[str, Any]], n_axes: int) -> dict[str, Any]:
         n_axes: Axes of the target's position.
 
     Returns:
-        Medians and worst values over the runs, in metres where they are lengths, and of the RMSE the mean
-        with its standard deviation and 95% confidence interval (bootstrap over the runs); None where there is
-        no truth or no such baseline. `anees_band95` is where the mean of the runs' ANEES lies if the filter
-        knows its error and a run's errors are all one: the widest that the band can be.
+        Medians and worst values over the runs, lengths in metres or, in the image plane, in pixels; of the
+        RMSE the mean with its standard deviation and 95% confidence interval (bootstrap over the runs); None
+        where there is no truth or no such baseline. `anees_band95` is where the mean of the runs' ANEES lies
+        if the filter knows its error and a run's errors are all one: the widest that the band can be.
     """
     best = [_best_single(run) for run in runs]
     per_run = {
-        "dcpf": [run["rmse_m"]["dcpf"] for run in runs],
-        "cpf": [run["rmse_m"]["cpf"] for run in runs],
+        "dcpf": [length(run, "rmse")["dcpf"] for run in runs],
+        "cpf": [length(run, "rmse")["cpf"] for run in runs],
         "best_single": best,
     }
     ratios = [run["ratio_dcpf_cpf"] for run in runs]
     of_best = [d / s if d is not None and s else None for d, s in zip(per_run["dcpf"], best, strict=True)]
+    unit = runs[0].get("unit", "m")
+    lengths = {
+        "rmse": {name: _spread(values) for name, values in per_run.items()},
+        "mean_rmse": {name: _mean(values) for name, values in per_run.items()},
+        "disagreement": _spread([length(run, "disagreement") for run in runs]),
+    }
     return {
         "runs": len(runs),
-        "rmse_m": {name: _spread(values) for name, values in per_run.items()},
-        "mean_rmse_m": {name: _mean(values) for name, values in per_run.items()},
+        "unit": unit,
+        **in_unit(lengths, unit),
         "ratio_dcpf_cpf": _spread(ratios),
         "ratio_dcpf_best_single": _spread(of_best),
         "lost_fraction": {
             name: sum(bool(run["lost"][name]) for run in runs) / len(runs) for name in ("dcpf", "cpf")
         },
-        "disagreement_m": _spread([run["disagreement_m"] for run in runs]),
         "anees": {name: _spread([run["anees"][name] for run in runs]) for name in ("dcpf", "cpf")},
         "anees_band95": anees_band(len(runs), n_axes),
         "tracking": {name: _tracking([run["tracking"][name] for run in runs]) for name in ("dcpf", "cpf")},
@@ -52,7 +58,7 @@ def compare(runs: Sequence[Mapping[str, Any]], n_axes: int) -> dict[str, Any]:
 
 
 def _best_single(run: Mapping[str, Any]) -> float | None:
-    return min((value for value in run["rmse_m"]["single"].values() if value is not None), default=None)
+    return min((value for value in length(run, "rmse")["single"].values() if value is not None), default=None)
 
 
 def _spread(values: Sequence[float | None]) -> dict[str, float] | None:

@@ -1,4 +1,4 @@
-"""What an experiment has found, as arrays: runs x frames, in metres."""
+"""What an experiment has found, as arrays: runs x frames, in the unit of the target's space."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,6 +35,11 @@ class GroupFindings:
 
     group: Group
     results: Sequence[Mapping[Kind, Mapping[str, Any]]]
+
+    @property
+    def unit(self) -> str:
+        """The unit of positions and errors: m, or px in the image plane."""
+        return self.group.scenario_run.target.unit
 
     @property
     def settings(self) -> dict[str, str]:
@@ -82,6 +87,11 @@ class GroupFindings:
     def errors(self, track: Track) -> Float[np.ndarray, "R C T"]:
         """The position error of each run and node that stands for the estimator, from frame 1 on."""
         return np.take_along_axis(self.node_errors(track), self.best(track)[:, :, None], axis=1)
+
+    def scored(self, track: Track) -> list[Float[np.ndarray, "C T"]]:
+        """The same without the frames whose truth nobody knows: NaN is a missing estimate there."""
+        there = np.isfinite(self.truth()[:, 1:]).all(axis=2)
+        return [errors[:, known] for errors, known in zip(self.errors(track), there, strict=True)]
 
     def rmse(self, track: Track) -> Float[np.ndarray, " R"]:
         """The RMSE of each run: over the nodes of DCPF, of the best single camera."""

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from sim.running.results import length
+
 
 def joined(summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """The summary that the run would have written as a whole, without timings.
@@ -15,12 +17,12 @@ def joined(summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     whole.pop("timing")
     if central is None or "cameras" not in summaries:
         return whole
-    for key in ("rmse_m", "lost", "anees", "tracking"):
+    for key in (f"rmse_{whole['unit']}", "lost", "anees", "tracking"):
         whole[key] = {**whole[key], "cpf": central[key]["cpf"]}
     network = {**whole["network"]}
     for key in ("bytes_per_frame", "bytes_at_start"):
         network[key] = {**network[key], "cpf": central["network"][key]["cpf"]}
-    ours, theirs = whole["rmse_m"]["dcpf"], whole["rmse_m"]["cpf"]
+    ours, theirs = (length(whole, "rmse")[name] for name in ("dcpf", "cpf"))
     return {
         **whole,
         "network": network,

@@ -18,6 +18,7 @@ from sim.experiments.found.findings import Findings, GroupFindings, Track
 from sim.metrics.intervals import mean_interval
 from sim.metrics.sets import gospa, ospa
 from sim.running.metrics import is_lost
+from sim.running.results import Results, in_unit, length
 
 _TRACKS: tuple[Track, ...] = ("dcpf", "cpf", "single", "coded")
 
@@ -94,23 +95,25 @@ def _cells(each: GroupFindings) -> Iterator[dict[str, Any]]:
             "preset": group.preset,
             "settings": each.settings,
             "seed": seed,
-            **{key: summary[key] for key in ("rmse_m", "lost", "anees", "disagreement_m", "tracking")},
-            "rmse_coded_m": float(each.rmse("coded")[run]) if "coded" in errors else None,
+            "unit": each.unit,
+            **in_unit({name: length(summary, name) for name in ("rmse", "disagreement")}, each.unit),
+            **{key: summary[key] for key in ("lost", "anees", "tracking")},
+            f"rmse_coded_{each.unit}": float(each.rmse("coded")[run]) if "coded" in errors else None,
             "bytes_per_frame": summary["network"]["bytes_per_frame"],
-            "errors_m": {track: as_plain(found, 5) for track, found in by_frame.items()},
+            f"errors_{each.unit}": {track: as_plain(found, 5) for track, found in by_frame.items()},
         }
 
 
 def _rows(each: GroupFindings) -> Iterator[dict[str, Any]]:
     """One line of the CSV for each estimator of a group."""
     group, n_axes = each.group, each.group.scenario_run.target.n_axes
-    sent = each.bytes_per_frame()
+    sent, limit = each.bytes_per_frame(), Results(group.scenario_run).lost_error
     for track in _TRACKS:
         if not each.has(track):
             continue
-        runs, errors = each.rmse(track), each.errors(track)
+        runs, errors = each.rmse(track), each.scored(track)
         interval = mean_interval(runs)
-        lost = [any(is_lost(node) for node in run) for run in errors]
+        lost = [any(is_lost(node, limit) for node in run) for run in errors]
         nees = each.nees(track)[:, :, 1:]
         yield {
             "study": group.study,
@@ -118,16 +121,17 @@ def _rows(each: GroupFindings) -> Iterator[dict[str, Any]]:
             "preset": group.preset,
             **each.settings,
             "estimator": "best single" if track == "single" else "cpf jpeg" if track == "coded" else track,
+            "unit": each.unit,
             "runs": len(runs),
-            "rmse_mean_m": f"{interval.value:.5f}",
-            "rmse_low95_m": f"{interval.low:.5f}",
-            "rmse_high95_m": f"{interval.high:.5f}",
-            "rmse_deviation_m": f"{np.std(runs, ddof=1) if len(runs) > 1 else 0.0:.5f}",
-            "rmse_median_m": f"{np.median(runs):.5f}",
-            "rmse_worst_m": f"{runs.max():.5f}",
+            "rmse_mean": f"{interval.value:.5f}",
+            "rmse_low95": f"{interval.low:.5f}",
+            "rmse_high95": f"{interval.high:.5f}",
+            "rmse_deviation": f"{np.std(runs, ddof=1) if len(runs) > 1 else 0.0:.5f}",
+            "rmse_median": f"{np.median(runs):.5f}",
+            "rmse_worst": f"{runs.max():.5f}",
             "lost_fraction": f"{np.mean(lost):.3f}",
-            "ospa_m": f"{np.mean([ospa(node) for run in errors for node in run]):.5f}",
-            "gospa_m": f"{np.sqrt(np.mean([gospa(node) ** 2 for run in errors for node in run])):.5f}",
+            "ospa": f"{np.mean([ospa(node, limit) for run in errors for node in run]):.5f}",
+            "gospa": f"{np.sqrt(np.mean([gospa(node, limit) ** 2 for run in errors for node in run])):.5f}",
             "anees": f"{np.nanmean(nees) / n_axes:.4f}",
             "bytes_per_frame": f"{sent.get('jpeg' if track == 'coded' else track, 0.0):.0f}",
         }

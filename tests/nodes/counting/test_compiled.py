@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from nodes.counting import build
 from nodes.counting.build import KernelError, load_kernel
 from nodes.counting.codebook import codebook
-from nodes.counting.compiled import count_compiled, marks_of
+from nodes.counting.compiled import compile_reference, counts_compiled, distances_compiled
 from nodes.counting.histogram import SamplingOptions, count
 from nodes.filtering.color import ColorOptions, coding, quantize
+from nodes.filtering.pattern import Pattern, coefficients, squared_distances
 
 HEIGHT, WIDTH = 30, 40
 
@@ -38,7 +39,7 @@ def boxes_of(draw):
 @given(
     st.integers(0, 2**32 - 1),
     boxes_of(),
-    st.sampled_from([("rgb", 8), ("rgb", 3), ("joint_rgb", 6), ("joint_rgb", 8)]),
+    st.sampled_from([("rgb", 8), ("rgb", 3), ("joint_rgb", 6), ("joint_rgb", 8), ("hue", 40)]),
     st.sampled_from([(1.0,), (0.2, 0.5, 0.3)]),
     st.sampled_from([None, (15, 15), (4, 9)]),
     st.sampled_from([0.0, 0.1, 1.0]),
@@ -48,18 +49,19 @@ def test_counts_are_equal_to_the_last_one(seed, boxes, colors, parts, grid, shar
     space, n_bins = colors
     options = ColorOptions(space=space, bins_per_channel=n_bins, parts=parts, part_weights=parts)
     image = rng.integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8)
-    gain = rng.uniform(0.8, 1.25, 3)
+    gain = rng.uniform(0.8, 1.25, 3) if space != "hue" else np.ones(3)
     book = codebook(rng.random((len(parts), options.n_channels, options.n_bins)) < share, parts)
-    scale = rng.random(len(book.part))
+    scale, perfect = rng.random(len(book.part)), rng.random(len(parts))
     sampling = SamplingOptions(grid=grid, kernel="epanechnikov")
-    expected, expected_pixels = count(quantize(image, options, gain), boxes, book, sampling)
-    counts, pixels, coefficients = count_compiled(
-        image, coding(options, gain), boxes, marks_of(book), scale, grid, sampling.kernel
-    )
+    expected, in_parts = count(quantize(image, options, gain), boxes, book, sampling)
+    reference = compile_reference(book, scale, perfect)
+    asked = image, coding(options, gain), boxes, reference, grid, sampling.kernel
+    counts, pixels = counts_compiled(*asked)
     np.testing.assert_array_equal(counts, expected)
-    np.testing.assert_array_equal(pixels, expected_pixels)
-    of_part = np.sqrt(expected / np.maximum(expected_pixels, 1)[:, book.part]) * scale
-    np.testing.assert_allclose(coefficients, of_part.sum(axis=1), atol=1e-12)
+    np.testing.assert_array_equal(pixels, in_parts)
+    pattern = Pattern(book, scale, np.searchsorted(book.part, np.arange(len(parts) + 1)), perfect)
+    distances = squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
+    np.testing.assert_allclose(distances_compiled(*asked), distances, atol=1e-12)
 
 
 def test_without_a_compiler_it_says_what_to_do(monkeypatch):

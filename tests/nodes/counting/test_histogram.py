@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 from nodes.counting.codebook import codebook
 from nodes.counting.grid import sample_positions
-from nodes.counting.histogram import SamplingOptions, count
+from nodes.counting.histogram import SamplingOptions, count, locate
 
 HEIGHT, WIDTH = 30, 40
 PARTS = (0.2, 0.5, 0.3)
@@ -134,3 +134,13 @@ def test_samples_are_the_quantiles_of_the_kernel(n, curvature):
 
 def test_the_uniform_kernel_takes_the_middles_of_equal_cells():
     np.testing.assert_allclose(sample_positions(4, "uniform", 1.0), [1 / 8, 3 / 8, 5 / 8, 7 / 8])
+
+
+def test_the_region_covers_the_pixels_that_count_and_no_more():
+    boxes, book = np.array([[10.2, 20.7, 30.1, 40.0], [25.0, 5.5, 50.5, 30.2]]), full_book(1, 2, (1.0,))
+    assert locate(boxes, (160, 120), book, EVERY_PIXEL).region == (10, 6, 51, 40)
+    assert locate(boxes - 22.0, (160, 120), book, EVERY_PIXEL).region == (0, 0, 29, 18)
+    assert locate(boxes[:0], (160, 120), book, EVERY_PIXEL).region == (159, 119, 160, 120)
+    corners = SamplingOptions(grid=(2, 2))  # at a quarter and three quarters of a box
+    assert locate(boxes, (160, 120), book, corners).region == (15, 11, 45, 36)
+    assert locate(boxes - 22.0, (160, 120), book, corners).region == (0, 0, 23, 14)

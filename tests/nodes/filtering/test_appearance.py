@@ -70,6 +70,19 @@ def test_the_distance_is_opencvs_hellinger_distance_squared(seed):
 
 
 @given(seeds)
+def test_the_distance_of_truong_and_kim_needs_no_normalised_histograms(seed):
+    """Their Eq. 13-14, on counts of boxes that hold different numbers of pixels."""
+    rng = np.random.default_rng(seed)
+    other = random_counts(rng, JOINT, 1, n_pixels=35)
+    H1, H2 = random_counts(rng, JOINT, 1).ravel(), other.ravel()
+    mean1, mean2 = H1.mean(), H2.mean()  # Eq. 14: 1/M times the sum over M bins
+    M = len(H1)
+    d = np.sqrt(max(1 - np.sqrt(H1 * H2).sum() / np.sqrt(mean1 * mean2 * M**2), 0.0))
+    reference = H1.reshape(1, 1, -1) / H1.sum()
+    np.testing.assert_allclose(distances(other, reference, JOINT, n_pixels=35), d**2, atol=1e-12)
+
+
+@given(seeds)
 def test_channels_count_alike_and_parts_by_their_weights(seed):
     rng = np.random.default_rng(seed)
     counts = random_counts(rng, PARTS, 4)

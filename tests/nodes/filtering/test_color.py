@@ -1,5 +1,6 @@
 """Quantisation against one line of NumPy, OpenCV, and a worked example; gains against gains put in."""
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,6 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from nodes.filtering.color import ColorOptions, channel_gain, gain_reference, quantize
+from nodes.filtering.hue import hue_bins
 
 NO_GAIN = np.ones(3)
 seeds = st.integers(0, 2**32 - 1)
@@ -41,6 +43,90 @@ def test_the_worked_example_of_truong_and_kim():
     assert quantize(image, ColorOptions(), NO_GAIN).ravel().tolist() == [1, 5, 3]
     joint = quantize(image, ColorOptions(space="joint_rgb"), NO_GAIN)
     assert joint.item() == 1 * 64 + 5 * 8 + 3
+
+
+def hue_bin(red, green, blue, n):
+    """The rule of `hue_bins`, one pixel at a time, in Python's integers."""
+    largest, smallest = max(red, green, blue), min(red, green, blue)
+    chroma = largest - smallest
+    if chroma < 16 or 8 * chroma < largest:
+        return n - 1
+    if largest == red:
+        hue = green - blue
+    elif largest == green:
+        hue = 2 * chroma + blue - red
+    else:
+        hue = 4 * chroma + red - green
+    return (n - 1) * (hue % (6 * chroma)) // (6 * chroma)
+
+
+@given(seeds, st.sampled_from([2, 3, 19, 40, 64]))
+def test_hue_bins_are_those_of_integer_arithmetic(seed, n):
+    image = random_image(seed)
+    image[:4] = image[:4] // 9 * 9  # with many ties
+    image[4:8] = 128 + image[4:8] // 8  # and many greys
+    expected = [[hue_bin(*pixel[::-1], n) for pixel in row] for row in image.tolist()]
+    np.testing.assert_array_equal(
+        quantize(image, ColorOptions(space="hue", bins_per_channel=n), NO_GAIN)[0], expected
+    )
+
+
+def test_every_quotient_that_a_hue_can_be_has_an_exact_floor():
+    # all chromas and hues there are: what pixels with these two numbers get
+    chroma = np.repeat(np.arange(16, 256), 256)
+    rest = np.minimum(np.tile(np.arange(256), 240), chroma)
+    for largest, first in ((2, 1), (1, 0), (0, 2)):  # red to green to blue
+        image = np.zeros((len(chroma), 1, 3), np.uint8)
+        image[:, 0, largest], image[:, 0, first] = chroma, rest
+        hue = {2: rest, 1: 2 * chroma + rest, 0: 4 * chroma + rest}[largest]
+        np.testing.assert_array_equal(hue_bins(image, 40)[:, 0], 39 * hue // (6 * chroma) % 39)
+
+
+@given(seeds)
+def test_hue_is_opencvs_within_its_rounding(seed):
+    image = random_image(seed)
+    bins = quantize(image, ColorOptions(space="hue", bins_per_channel=40), NO_GAIN)[0]
+    hue, saturation, value = cv2.split(cv2.cvtColor(image, cv2.COLOR_BGR2HSV).astype(float))
+    colored = bins < 39
+    # the middle of the bin against the angle, around the circle: half a bin and OpenCV's own degree,
+    # a little more by its table of reciprocals
+    apart = np.abs((bins + 0.5) * 360 / 39 - 2 * hue)
+    assert np.minimum(apart, 360 - apart)[colored].max(initial=0) <= 0.5 * 360 / 39 + 1.2
+    assert (saturation[~colored] / 255 * value[~colored]).max(initial=0) < max(16, 255 / 8) + 1
+
+
+@pytest.mark.parametrize(
+    ("red_green_blue", "expected"),
+    [
+        ((0, 0, 0), 39),
+        ((255, 255, 255), 39),
+        ((140, 126, 130), 39),  # too little colour to tell
+        ((255, 235, 235), 39),  # too pale
+        ((255, 0, 0), 0),
+        ((0, 255, 0), 13),
+        ((0, 0, 255), 26),
+        ((255, 0, 1), 38),  # the last sector, next to red
+        ((205, 160, 130), 2),  # a face: 24 degrees
+    ],
+)
+def test_the_hue_of_some_colours(red_green_blue, expected):
+    image = np.array(red_green_blue[::-1], dtype=np.uint8).reshape(1, 1, 3)
+    assert hue_bins(image, 40).item() == expected
+
+
+def test_hue_is_taken_without_the_gain():
+    image = np.array([[[100, 150, 200]]], np.uint8)
+    brighter = np.array([[[50, 150, 240]]], np.uint8)
+    options = ColorOptions(space="hue", bins_per_channel=40)
+    np.testing.assert_array_equal(
+        quantize(brighter, options, np.array([0.5, 1.0, 1.2])), quantize(image, options, NO_GAIN)
+    )
+
+
+def test_only_hue_can_have_many_bins():
+    assert ColorOptions(space="hue", bins_per_channel=40).n_bins == 40
+    with pytest.raises(ValidationError, match="in rgb take at most 16"):
+        ColorOptions(bins_per_channel=40)
 
 
 def test_every_value_has_a_bin_and_the_gain_cannot_leave_the_last():

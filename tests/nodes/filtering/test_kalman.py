@@ -13,13 +13,16 @@ from nodes.camera import look_at
 from nodes.filtering.fusion import FusionOptions, fuse, pack, propagate, unpack
 from nodes.filtering.gaussian import Information, Moments, log_factor, moments
 from nodes.filtering.local import local_filter
-from nodes.filtering.motion import DynamicsOptions, constant_velocity, predict
+from nodes.filtering.motion import DynamicsOptions, autoregression, constant_velocity, predict
 from nodes.filtering.observation import ObservationModel, ObservationOptions, Picture
 from nodes.filtering.particles import resample_if_degenerate, sample_gaussian
 from nodes.filtering.sir import View, sir_step
 from nodes.filtering.target import TargetOptions
 
 MOTION = constant_velocity(2, 0.1, DynamicsOptions(velocity_variance=0.04))
+AUTOREGRESSION = autoregression(
+    2, DynamicsOptions(model="autoregressive", position_variance=0.01, A=((1.6, 0.1), (0.0, 1.5)), B=-0.5)
+)
 START, START_DEVIATION = np.array([1.0, -2.0, 0.5, 0.3]), np.array([0.1, 0.1, 0.3, 0.3])
 N_FRAMES, N_CAMERAS, THRESHOLD = 12, 4, 0.5
 
@@ -32,7 +35,7 @@ class Twin:
     exact: list[Moments]
 
 
-def twin(seed):
+def twin(seed, motion):
     rng = np.random.default_rng([seed, 1])
     state = START + START_DEVIATION * rng.standard_normal(4)
     # each camera measures well across and badly along its own direction
@@ -42,8 +45,8 @@ def twin(seed):
     H = np.eye(2, 4)
     measured, exact = [], []
     for _ in range(N_FRAMES):
-        state = predict(state[None], MOTION, rng)[0]
-        mean, covariance = MOTION.F @ mean, MOTION.F @ covariance @ MOTION.F.T + np.diag(MOTION.variances)
+        state = predict(state[None], motion, rng)[0]
+        mean, covariance = motion.F @ mean, motion.F @ covariance @ motion.F.T + np.diag(motion.variances)
         measured.append([])
         for R in covariances:
             z = rng.multivariate_normal(state[:2], R)
@@ -70,25 +73,25 @@ def position_sensor(measurement):
     return View(Sensor(camera, TargetOptions(), ObservationOptions()), picture, None)
 
 
-def run_sir(problem, n, seed):
+def run_sir(problem, motion, n, seed):
     rng = np.random.default_rng([seed, 2])
     particles = sample_gaussian(START, START_DEVIATION, n, rng)
     for measurements in problem.measured:
         views = [position_sensor(measurement) for measurement in measurements]
-        particles, info = sir_step(particles, views, MOTION, THRESHOLD, rng)
+        particles, info = sir_step(particles, views, motion, THRESHOLD, rng)
         yield info.estimate
 
 
-def run_fusion(problem, n, seed, options):
+def run_fusion(problem, motion, n, seed, options):
     """C cameras with an exact average; the estimates of the first."""
     rngs = [np.random.default_rng([seed, 3, camera]) for camera in range(N_CAMERAS)]
     local_rngs = [np.random.default_rng([seed, 4, camera]) for camera in range(N_CAMERAS)]
     clouds = [sample_gaussian(START, START_DEVIATION, n, rng) for rng in rngs]
     own = [sample_gaussian(START, START_DEVIATION, n, rng) for rng in local_rngs]
     for measurements in problem.measured:
-        predicted = [propagate(cloud, MOTION, rng) for cloud, rng in zip(clouds, rngs, strict=True)]
+        predicted = [propagate(cloud, motion, rng) for cloud, rng in zip(clouds, rngs, strict=True)]
         if options.local_particles == "own":
-            local_clouds = [propagate(cloud, MOTION, rng) for cloud, rng in zip(own, local_rngs, strict=True)]
+            local_clouds = [propagate(cloud, motion, rng) for cloud, rng in zip(own, local_rngs, strict=True)]
         else:
             local_clouds = predicted
         results = [
@@ -102,7 +105,7 @@ def run_fusion(problem, n, seed, options):
         average = np.mean([pack(result, options) for result in results], axis=0)
         fused = unpack(average, N_CAMERAS, 4, options)
         posteriors = [
-            fuse(clouds[c], predicted[c], fused, MOTION, options, rngs[c]) for c in range(N_CAMERAS)
+            fuse(clouds[c], predicted[c], fused, motion, options, rngs[c]) for c in range(N_CAMERAS)
         ]
         yield moments(posteriors[0].states, posteriors[0].weights)
         clouds = [
@@ -110,12 +113,12 @@ def run_fusion(problem, n, seed, options):
         ]
 
 
-def errors(run, n, seeds):
+def errors(run, n, seeds, motion=MOTION):
     """n (m - m*)ᵀ P⁻¹ (m - m*) / D and tr(P⁻¹ p) / D - 1, averaged over frames and seeds."""
     scaled, wider = [], []
     for seed in seeds:
-        problem = twin(seed)
-        for found, exact in zip(run(problem, n, seed), problem.exact, strict=True):
+        problem = twin(seed, motion)
+        for found, exact in zip(run(problem, motion, n, seed), problem.exact, strict=True):
             off = found.mean - exact.mean
             scaled.append(n * off @ np.linalg.solve(exact.covariance, off) / 4)
             wider.append(np.trace(np.linalg.solve(exact.covariance, found.covariance)) / 4 - 1)
@@ -135,10 +138,14 @@ CASES = {
 }
 
 
+def _name(case):
+    return f"{case.rule}-{case.proposal}-{case.local_particles}" if case in CASES else ""
+
+
 @pytest.mark.parametrize(
     ("options", "limits"),
     CASES.items(),
-    ids=lambda case: f"{case.rule}-{case.proposal}-{case.local_particles}" if case in CASES else "",
+    ids=_name,
 )
 def test_every_rule_and_proposal_is_near_the_kalman_filter(options, limits):
     error, wider = errors(lambda *run: run_fusion(*run, options), 1000, range(3))
@@ -146,10 +153,19 @@ def test_every_rule_and_proposal_is_near_the_kalman_filter(options, limits):
     assert abs(wider) < limits[1]
 
 
-def test_the_sir_filter_is_near_the_kalman_filter():
-    error, wider = errors(run_sir, 1000, range(3))
+@pytest.mark.parametrize("motion", [MOTION, AUTOREGRESSION], ids=["velocity", "autoregression"])
+def test_the_sir_filter_is_near_the_kalman_filter(motion):
+    error, wider = errors(run_sir, 1000, range(3), motion)
     assert error < 100
     assert abs(wider) < 0.1
+
+
+@pytest.mark.parametrize("options", CASES, ids=_name)
+def test_so_they_are_where_the_state_is_the_last_two_positions(options):
+    # its second half moves without noise: no proposal may divide by that
+    error, wider = errors(lambda *run: run_fusion(*run, options), 1000, range(3), AUTOREGRESSION)
+    assert error < CASES[options][0]
+    assert abs(wider) < 0.2
 
 
 @pytest.mark.parametrize("run", [run_sir, lambda *run: run_fusion(*run, FusionOptions())])

@@ -12,7 +12,6 @@ from nodes.filtering.color import ColorOptions
 from nodes.filtering.observation import (
     ObservationModel,
     ObservationOptions,
-    covered_region,
     surrounding_boxes,
 )
 from nodes.filtering.target import TargetOptions, project_boxes
@@ -133,13 +132,6 @@ def test_gain_correction_brings_the_colours_back():
     plain, as_it_was = ready(ObservationOptions(color=color.model_copy(update={"gain_correction": False})))
     uncorrected = plain.sight(plain.look(brighter), HERE, as_it_was)
     assert corrected.squared_distance < 0.05 < uncorrected.squared_distance
-
-
-def test_the_region_covers_the_visible_boxes_and_no_more():
-    boxes = np.array([[10.2, 20.7, 30.1, 40.0], [25.0, 5.5, 50.5, 30.2]])
-    assert covered_region(boxes, CAMERA) == (10, 5, 51, 40)
-    assert covered_region(boxes - 22.0, CAMERA) == (0, 0, 29, 18)
-    assert covered_region(boxes[:0], CAMERA) == (0, 0, 1, 1)
 
 
 def test_surrounding_boxes_have_the_size_of_the_target_and_keep_off_its_middle():

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from nodes.camera import look_at
 from nodes.filtering.target import TargetOptions, project_boxes, visible_fraction
@@ -82,3 +83,30 @@ def test_the_visible_part_is_the_share_of_pixels_inside(seed):
         x, y = np.meshgrid(np.arange(left, right), np.arange(top, bottom))
         inside = (x >= 0) & (x < WIDTH) & (y >= 0) & (y < HEIGHT)
         assert fraction == pytest.approx(inside.mean())
+
+
+@given(seeds)
+def test_in_the_image_plane_a_box_has_one_size_around_its_pixel(seed):
+    target = TargetOptions(space="image", size_px=(15, 21))
+    centers = np.random.default_rng(seed).integers(-20, 180, (10, 2)).astype(float)
+    boxes = project_boxes(centers, target, camera())
+    np.testing.assert_array_equal(boxes[:, 2:] - boxes[:, :2], np.tile([15.0, 21.0], (10, 1)))
+    # around the centre of a pixel, an odd box holds whole pixels: 7 on each side of it, 10 above and below
+    np.testing.assert_array_equal(boxes[:, :2], centers - [7, 10])
+    assert (target.n_axes, target.unit) == (2, "px")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"space": "image"}, "needs size_px"),
+        ({"size_px": (10, 10)}, "size_px is for the image plane"),
+        ({"space": "volume", "size_px": (10, 10)}, "size_px is for the image plane"),
+        ({"space": "image", "size_px": (10, 10), "height": 1.8}, "height is in m"),
+        ({"space": "image", "size_px": (10, 10), "plane_height": 1.0}, "plane_height is in m"),
+        ({"space": "image", "size_px": (10, 0)}, "greater than 0"),
+    ],
+)
+def test_the_size_is_in_the_unit_of_the_space(options, message):
+    with pytest.raises(ValidationError, match=message):
+        TargetOptions(**options)

@@ -45,8 +45,8 @@ def test_a_sweep_has_a_line_for_every_setting_and_seed(compare, small):
         rows = list(csv.DictReader(file))
     assert [row["estimator"] for row in rows] == ["dcpf", "cpf", "best single"] * 2
     # CPF knows nothing of rounds: the same runs, not similar ones.
-    assert rows[1]["rmse_mean_m"] == rows[4]["rmse_mean_m"]
-    assert rows[0]["rmse_mean_m"] != rows[3]["rmse_mean_m"]
+    assert rows[1]["rmse_mean"] == rows[4]["rmse_mean"]
+    assert rows[0]["rmse_mean"] != rows[3]["rmse_mean"]
 
 
 @pytest.mark.processes

@@ -45,6 +45,7 @@ def results(group):
     network = {
         "network": {key: {"dcpf": 512 * t, "cpf": 1e6} for key in ("bytes_per_frame", "bytes_at_start")},
         "timing": {},
+        "unit": "m",
     }
     for seed in group.seeds:
         error = 0.1 / t + 10 / n + 0.01 * seed
