@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sim.running.experiment import run_once
 
 from network.codec import encode_public
 from network.messages import EstimateMessage
@@ -125,8 +124,8 @@ WALKER = [("target.object", "null"), ("target.person", "walker"), ("target.size_
     ],
     ids=["face", "face-robust", "cup", "walker"],
 )
-def test_the_papers_trackers_follow_their_targets(name, overrides, limit):
-    summary = run_once(FOLDER / f"{name}.yaml", [*overrides, ("seed", "3")])
+def test_the_papers_trackers_follow_their_targets(summary_of, name, overrides, limit):
+    summary = summary_of(FOLDER / f"{name}.yaml", *overrides, ("seed", "3"))
 
     for rmse in (summary["rmse_px"]["dcpf"], summary["rmse_px"]["single"]["C1"]):
         assert rmse < limit

@@ -10,28 +10,20 @@ from sim.experiments.computing.parts import cameras_part, central_part, code_ver
 from sim.experiments.computing.pictures import CodedSource, KeptSource, kept_pictures
 from sim.experiments.computing.work import compute
 from sim.experiments.found.joining import joined
-from sim.running.results import Results, summarize
 from sim.scenario.loading import load_scenario
 
 SHORT = [("frames", "4"), ("filter.n_particles", "20")]
 
 
-def summary_of(path, told, overrides):
-    results = Results(load_scenario(path, overrides))
-    for message in told(path, *overrides):
-        results.add(message)
-    return summarize(results, processes=1)
-
-
 @pytest.mark.parametrize("preset", ["paper", "robust"])
-def test_the_parts_of_a_run_make_its_summary(small, told, preset):
+def test_the_parts_of_a_run_make_its_summary(small, summary_of, preset):
     overrides = [*SHORT, ("preset", preset)]
     scenario = load_scenario(small, overrides)
     parts = {"cameras": cameras_part(scenario, with_single=True), "central": central_part(scenario)}
 
     found = {kind: compute(part, code_version())["summary"] for kind, part in parts.items()}
 
-    whole = summary_of(small, told, overrides)
+    whole = summary_of(small, *overrides)
     whole.pop("timing")
     assert joined(found) == whole
 
@@ -74,8 +66,8 @@ def test_a_part_is_known_by_what_it_depends_on(small, override, for_cameras, for
 @pytest.mark.parametrize(
     "override", [("network.iterations", "7"), ("network.graph", "path"), ("fusion.rule", "eq17")]
 )
-def test_cpf_does_not_depend_on_what_its_key_leaves_out(small, told, override):
-    one, other = (summary_of(small, told, overrides) for overrides in (SHORT, [*SHORT, override]))
+def test_cpf_does_not_depend_on_what_its_key_leaves_out(small, summary_of, override):
+    one, other = (summary_of(small, *overrides) for overrides in (SHORT, [*SHORT, override]))
 
     assert one["rmse_m"]["cpf"] == other["rmse_m"]["cpf"]
 
