@@ -5,12 +5,13 @@ Messages between nodes are little-endian and begin with one header of 24 bytes:
 | offset | type | field |
 |---|---|---|
 | 0 | u8 | version of this layout, 1 |
-| 1 | u8 | kind: 1 consensus, 2 pixels, 3 confirm |
+| 1 | u8 | kind in the lower four bits: 1 consensus, 2 pixels, 3 confirm |
+|   |    | encoding in the upper four: consensus: 0 float64, 1 float32, 2 float16; others 0 |
 | 2 | 3 x u16 | consensus: numbers in the payload K, round, sender's degree; pixels: height, width, 0 |
 | 8 | u64 | run: BLAKE2b of its name, 8 bytes |
 | 16 | u32 | sender: BLAKE2b of its name, 4 bytes |
 | 20 | u32 | frame |
-| 24 | | consensus: K float64; pixels: height x width x 3 bytes, BGR |
+| 24 | | consensus: K numbers, float16 ones after an i16 e and times 2^e; pixels: height x width x 3, BGR |
 
 Reading never trusts: what is not exactly such a message is refused with its reason.
 """
@@ -38,15 +39,21 @@ from network.messages import (
     StatusMessage,
     TruthMessage,
 )
+from network.quantization import ENCODINGS, LARGEST, Encoding, half_exponent
 
 VERSION = 1
 MAX_PIXELS = 64_000_000
 MAX_JSON_BYTES = 1_000_000
-MAX_MAGNITUDE = 1e150
+MAX_MAGNITUDE = LARGEST["float64"]
 """Larger numbers are refused like infinity: sums and products of them would overflow."""
 
 _HEADER = struct.Struct("<BBHHHQII")
-_NUMBER = np.dtype("<f8")
+_NUMBERS: dict[Encoding, np.dtype[np.floating]] = {
+    "float64": np.dtype("<f8"),
+    "float32": np.dtype("<f4"),
+    "float16": np.dtype("<f2"),
+}
+_EXPONENT = struct.Struct("<h")
 _KINDS: dict[type[PeerMessage], int] = {ConsensusMessage: 1, PixelsMessage: 2, ConfirmMessage: 3}
 _JSON: dict[type, TypeAdapter[Any]] = {
     kind: TypeAdapter(kind) for kind in (EstimateMessage, ControlMessage, StatusMessage, TruthMessage)
@@ -103,25 +110,38 @@ def encode_consensus(run: str, message: ConsensusMessage) -> bytes:
         raise ValueError(
             f"{message.sender} has a value that is not finite in frame {message.frame}: {payload}"
         )
-    header = _header(run, message, payload.size, message.round, message.degree)
-    return header + payload.astype(_NUMBER, copy=False).tobytes()
+    header = _header(run, message, payload.size, message.round, message.degree, message.encoding)
+    scale = b""
+    if message.encoding == "float16":
+        exponent = half_exponent(payload)
+        payload, scale = np.ldexp(payload, -exponent), _EXPONENT.pack(exponent)
+    return header + scale + payload.astype(_NUMBERS[message.encoding], copy=False).tobytes()
 
 
 def decode_consensus(run: str, sender: str, data: bytes) -> ConsensusMessage:
-    """A round's value; its payload is a read-only view of the data.
+    """A round's value; its payload is read-only, and a view of the data where they are float64.
 
     Raises:
         RefusedMessage: The data are not such a message.
     """
-    frame, size, round_, degree = _read_header(ConsensusMessage, run, sender, data)
-    if len(data) != _HEADER.size + 8 * size:
+    frame, size, round_, degree, encoding = _read_header(ConsensusMessage, run, sender, data)
+    number, start = _NUMBERS[encoding], _HEADER.size + _EXPONENT.size * (encoding == "float16")
+    if len(data) != start + number.itemsize * size:
         raise RefusedMessage("length")
     if round_ < 1:
         raise RefusedMessage("round")
-    payload = np.frombuffer(data, _NUMBER, size, _HEADER.size)
+    payload = np.frombuffer(data, number, size, start)
+    if encoding != "float64":
+        payload = payload.astype(float)
+        if encoding == "float16":
+            # an exponent beyond all floats gives infinity, which is refused
+            (exponent,) = _EXPONENT.unpack_from(data, _HEADER.size)
+            with np.errstate(over="ignore", invalid="ignore"):
+                payload = np.ldexp(payload, exponent)
+        payload.flags.writeable = False
     if not _usable(payload):
         raise RefusedMessage("not-finite")
-    return ConsensusMessage(sender, frame, round_, degree, payload)
+    return ConsensusMessage(sender, frame, round_, degree, payload, encoding)
 
 
 def encode_pixels(run: str, message: PixelsMessage) -> bytes:
@@ -136,7 +156,7 @@ def decode_pixels(run: str, sender: str, data: bytes) -> PixelsMessage:
     Raises:
         RefusedMessage: The data are not such a message, or the picture has more than ``MAX_PIXELS``.
     """
-    frame, height, width, _ = _read_header(PixelsMessage, run, sender, data)
+    frame, height, width, *_ = _read_header(PixelsMessage, run, sender, data)
     if not 0 < height * width <= MAX_PIXELS:
         raise RefusedMessage("size")
     if len(data) != _HEADER.size + 3 * height * width:
@@ -228,23 +248,25 @@ def _digest(name: str, size: int) -> int:
     return int.from_bytes(blake2b(name.encode(), digest_size=size).digest(), "little")
 
 
-def _header(run: str, message: PeerMessage, a: int, b: int, c: int) -> bytes:
-    return _HEADER.pack(
-        VERSION, _KINDS[type(message)], a, b, c, _digest(run, 8), _digest(message.sender, 4), message.frame
-    )
+def _header(run: str, message: PeerMessage, a: int, b: int, c: int, encoding: Encoding = "float64") -> bytes:
+    code = _KINDS[type(message)] | ENCODINGS.index(encoding) << 4
+    return _HEADER.pack(VERSION, code, a, b, c, _digest(run, 8), _digest(message.sender, 4), message.frame)
 
 
-def _read_header(kind: type[PeerMessage], run: str, sender: str, data: bytes) -> tuple[int, int, int, int]:
-    """Frame and the three numbers that depend on the kind."""
+def _read_header(
+    kind: type[PeerMessage], run: str, sender: str, data: bytes
+) -> tuple[int, int, int, int, Encoding]:
+    """Frame, the three numbers that depend on the kind, and the encoding of the payload."""
     if len(data) < _HEADER.size:
         raise RefusedMessage("length")
     version, code, a, b, c, run_id, sender_id, frame = _HEADER.unpack_from(data)
     if version != VERSION:
         raise RefusedMessage("version")
-    if code != _KINDS[kind]:
+    encoding = code >> 4
+    if code & 0x0F != _KINDS[kind] or encoding >= (len(ENCODINGS) if kind is ConsensusMessage else 1):
         raise RefusedMessage("kind")
     if run_id != _digest(run, 8):
         raise RefusedMessage("run")
     if sender_id != _digest(sender, 4):
         raise RefusedMessage("sender")
-    return frame, a, b, c
+    return frame, a, b, c, ENCODINGS[encoding]

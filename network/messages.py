@@ -14,6 +14,7 @@ from pydantic import ConfigDict, Field, GetPydanticSchema, PlainSerializer
 from pydantic_core import CoreSchema, core_schema
 
 from network.keys import NAME_PATTERN
+from network.quantization import Encoding
 
 
 def _json_array(nested: Any) -> GetPydanticSchema:
@@ -50,7 +51,8 @@ class ConsensusMessage:
         frame: Frame of the run.
         round: Round within the frame, from 1.
         degree: How many neighbours the sender has in this round.
-        payload: Its value after the rounds before this one.
+        payload: Its value after the rounds before this one, in the form that its algorithm gives it.
+        encoding: How the payload's numbers are written; they are such as it holds exactly.
     """
 
     kind: ClassVar[str] = "consensus"
@@ -59,6 +61,7 @@ class ConsensusMessage:
     round: int
     degree: int
     payload: Float[np.ndarray, " K"]
+    encoding: Encoding = "float64"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

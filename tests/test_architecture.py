@@ -19,6 +19,7 @@ PURE = (
     *sorted((ROOT / "nodes/filtering").glob("*.py")),
     *sorted((ROOT / "sim/metrics").glob("*.py")),
     ROOT / "sim/running/metrics.py",
+    *sorted((ROOT / "network/averaging").glob("*.py")),
     *(
         ROOT / "nodes" / name
         for name in ("camera.py", "central.py", "estimator.py", "setup.py", "smart_camera.py")
@@ -27,7 +28,15 @@ PURE = (
         ROOT / "network" / name
         for name in (
             *("codec.py", "consensus.py", "errors.py", "graph.py", "keys.py", "memory.py"),
-            *("messages.py", "options.py", "streams.py", "weights.py"),
+            *(
+                "messages.py",
+                "options.py",
+                "quantization.py",
+                "random_graphs.py",
+                "spectrum.py",
+                "streams.py",
+                "weights.py",
+            ),
         )
     ),
 )

@@ -19,7 +19,7 @@ from nodes.simd.array import ProcessorArray
 from nodes.simd.cost import Cost
 from nodes.simd.memory import Word
 from nodes.simd.options import SimdOptions
-from nodes.simd.programs.binning import channel_bins, joint_bins
+from nodes.simd.programs.binning import BinningOptions, channel_bins, hue_bins, joint_bins
 from nodes.simd.programs.boxes import (
     BoxWords,
     Part,
@@ -61,6 +61,9 @@ class SimdLikelihood:
         sampling: The grid; without one the array cannot follow.
         batching: Whether the emulation runs independent repetitions at once; the numbers are the same.
 
+    Attributes:
+        report: What the last measurement has cost, in a frame.
+
     Raises:
         ValueError: The sampling has no grid.
     """
@@ -71,6 +74,7 @@ class SimdLikelihood:
         if sampling.grid is None:
             raise ValueError("sampling.grid is null, and the array reads a fixed grid: give columns and rows")
         self.options = options
+        self.report: FrameReport | None = None
         self._color, self._batching = color, batching
         self._kernel, (n_columns, self._n_rows) = sampling.kernel, sampling.grid
         self._columns = sample_positions(n_columns, sampling.kernel, 1.0)
@@ -82,17 +86,14 @@ class SimdLikelihood:
         boxes: Float[np.ndarray, "N 4"],
         pattern: Pattern,
         picture_px: tuple[int, int],
-    ) -> tuple[Measurement, FrameReport]:
-        """Counts and distances.
+    ) -> Measurement:
+        """Counts and distances; `report` tells what they have cost.
 
         Args:
             bins: Bin indices of the pixels (of the region that the boxes need, or of the whole picture).
             boxes: left, top, right, bottom relative to `bins`, in pixels; they may reach over the border.
             pattern: The reference.
             picture_px: Width and height of the whole picture, which the array bins.
-
-        Returns:
-            The measurement and its cost in a frame.
         """
         array = ProcessorArray(self.options, batching=self._batching)
         array.costs[Step.BINNING] = Cost()
@@ -109,8 +110,8 @@ class SimdLikelihood:
             of_pass = slice(first, first + array.n)
             one_pass = _Pass(array, picture, boxes[of_pass])
             counts[of_pass], pixels[of_pass], ratio[of_pass] = one_pass.run(parts)
-        report = FrameReport.of(array, picture_px[1], min(len(boxes), array.n))
-        return Measurement(counts, pixels, 1 - ratio), report
+        self.report = FrameReport.of(array, picture_px[1], min(len(boxes), array.n))
+        return Measurement(counts, pixels, 1 - ratio)
 
     def _parts(self, pattern: Pattern) -> list[Part]:
         columns, n_columns = self._columns, len(self._columns)
@@ -205,7 +206,9 @@ def line_cost(options: SimdOptions, color: ColorOptions) -> Cost:
     array = ProcessorArray(options)
     buffers = (array.word(), array.word(), array.word())
     with array.step(Step.BINNING) as cost:
-        if color.space == "joint_rgb":
+        if color.space == "hue":
+            hue_bins(array, *buffers, BinningOptions(bins=color.bins_per_channel))
+        elif color.space == "joint_rgb":
             joint_bins(array, *buffers, color.bins_per_channel, np.ones(3))
         else:
             channel_bins(array, buffers, color.bins_per_channel, np.ones(3))

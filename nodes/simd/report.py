@@ -88,6 +88,18 @@ class FrameReport:
         return sum(cost.cycles for cost in self.costs.values())
 
     @property
+    def figures(self) -> dict[str, int | float]:
+        """The cost in a few numbers, for a node's status."""
+        return {
+            "cycles": self.cycles,
+            "clock_mhz": self.clock_mhz,
+            "frame_us": round(self.total_us, 1),
+            "share_of_frame": round(self.pipeline.share_of_frame, 4),
+            "line_memory_words": self.n_words,
+            "rate_hz": round(self.pipeline.rate_hz, 2),
+        }
+
+    @property
     def n_words(self) -> int:
         """The most words of line memory in use at once."""
         return sum(self.words.values())

@@ -10,6 +10,7 @@ from rich.logging import RichHandler
 
 from sim.commands.clip import clip
 from sim.commands.compare import compare
+from sim.commands.consensus import consensus
 from sim.commands.guard import guarded
 from sim.commands.inspect import check, footage, schema
 from sim.commands.node import central, node
@@ -25,7 +26,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (run, watch, compare, clip, simd, node, central, check, schema, footage):
+for command in (run, watch, compare, consensus, clip, simd, node, central, check, schema, footage):
     app.command()(guarded(command))
 
 

@@ -127,6 +127,8 @@ def _print(summary: dict[str, Any], scenario: Scenario, folder: Path) -> None:
     indefinite = summary["fusion"]["indefinite_local_fraction"]
     if indefinite:
         console.print(f"Eq. 17's ratio was no density in {indefinite:.0%} of the local results")
+    if "simd" in summary:
+        console.print(_array_text(summary["simd"], scenario.filter.simd.words), soft_wrap=True)
     timing = summary["timing"]
     if "frames_per_s" in timing:
         first, rate = timing["first_estimate_s"], timing["frames_per_s"]
@@ -134,6 +136,14 @@ def _print(summary: dict[str, Any], scenario: Scenario, folder: Path) -> None:
     if summary["died"]:
         console.print(f"did not reach the end: {', '.join(summary['died'])}")
     console.print(f"recorded in {folder}", soft_wrap=True)
+
+
+def _array_text(cost: dict[str, float], words: int) -> str:
+    return (
+        f"on a camera's array: {cost['cycles']:,} cycles, {1e-3 * cost['frame_us']:.1f} ms a frame at"
+        f" {cost['clock_mhz']:g} MHz ({cost['share_of_frame']:.0%} of it), {cost['line_memory_words']} of"
+        f" {words} words; it holds {cost['rate_hz']:.0f} frames/s"
+    )
 
 
 def _plain(value: float | None) -> str:

@@ -115,11 +115,16 @@ def make_plan(
             given = [*chosen, *fixed, *overrides]
             _check_keys(name, study, document, given, place)
             for settings in _settings(name, study, place):
-                scenario = resolve(document, [*given, *_in_file(settings, document)])
+                scenarios = _of_seeds(document, [*given, *_in_file(settings, document)], options.runs)
+                scenario = scenarios[0]
                 label = f"{scenario.name} ({scenario.preset})"
                 if labels.setdefault(label, document.path) != document.path:
                     label = f"{document.path} ({scenario.preset})"
-                groups.append(_group(name, study, label, scenario, settings, options.runs))
+                parts = tuple(_parts(each, study) for each in scenarios)
+                seeds = tuple(each.seed for each in scenarios)
+                groups.append(
+                    Group(name, label, scenario.name, scenario.preset, settings, seeds, parts, scenario)
+                )
     return Plan(options, tuple(groups))
 
 
@@ -131,8 +136,10 @@ def _check_keys(
     place: Callable[[str, str], str],
 ) -> None:
     resolved = resolve(document, given).model_dump(mode="json")
+    for key, value in given:
+        document = document.with_value(key, value)
     for key in study.sweep:
-        require_key(key, resolved, place(name, key))
+        require_key(key, [document.data, resolved], place(name, key))
 
 
 def _settings(
@@ -159,18 +166,18 @@ def _in_file(settings: Iterable[Setting], document: Document) -> Iterator[Settin
             yield key, value
 
 
-def _group(
-    study_name: str,
-    study: StudyOptions,
-    label: str,
-    scenario: Scenario,
-    settings: tuple[Setting, ...],
-    runs: int,
-) -> Group:
-    seeds = tuple(range(scenario.seed, scenario.seed + runs))
-    # Nothing that is resolved depends on the seed: the file need not be read for each.
-    parts = tuple(_parts(scenario.model_copy(update={"seed": seed}), study) for seed in seeds)
-    return Group(study_name, label, scenario.name, scenario.preset, settings, seeds, parts, scenario)
+def _of_seeds(document: Document, overrides: Sequence[Setting], runs: int) -> list[Scenario]:
+    """The scenario with its own seed and those after it, resolved."""
+    for key, value in overrides:
+        document = document.with_value(key, value)
+    first = resolve(document)
+    seeds = range(first.seed + 1, first.seed + runs)
+    network = document.data.get("network")
+    if isinstance(network, Mapping) and isinstance(network.get("graph"), Mapping):
+        # A graph that is drawn at random is another one for each seed.
+        return [first, *(resolve(document, [("seed", str(seed))]) for seed in seeds)]
+    # Nothing else that is resolved depends on the seed.
+    return [first, *(first.model_copy(update={"seed": seed}) for seed in seeds)]
 
 
 def _parts(scenario: Scenario, study: StudyOptions) -> dict[Kind, Part]:

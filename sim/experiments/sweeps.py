@@ -67,18 +67,18 @@ def as_text(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def require_key(key: str, resolved: Mapping[str, Any], source: str) -> None:
-    """Checks that a resolved scenario has a key.
+def require_key(key: str, scenarios: Sequence[Mapping[str, Any]], source: str) -> None:
+    """Checks that a scenario has a key.
 
     Args:
         key: Dotted; items of a list by number or name.
-        resolved: The scenario as plain data, every default filled in.
+        scenarios: The scenario as plain data, as its file has it and with every default filled in.
         source: What names the key, for the error.
 
     Raises:
         ScenarioError: It has not; the text names the nearest that there is.
     """
-    known = list(dict.fromkeys(_dotted_keys(resolved)))
+    known = list(dict.fromkeys(key for each in scenarios for key in _dotted_keys(each)))
     if key in known:
         return
     # The last part says most about what was meant: filter.alpha is filter.model_update.alpha.

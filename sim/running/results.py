@@ -159,6 +159,7 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
         },
         "network": _network(results),
         "fusion": _fusion(results),
+        **_array(results),
         "timing": {**results.timing, **_timing(results)},
     }
 
@@ -267,6 +268,16 @@ def _fusion(results: Results) -> dict[str, Any]:
         f"{name}_fraction": sum(_plain(s.counters.get(name)) for s in results.statuses.values()) / steps
         for name in names
     }
+
+
+def _array(results: Results) -> dict[str, Any]:
+    """What a frame costs a camera on the emulated array, if there is one: the most over the cameras."""
+    told = [status.counters["simd"] for status in results.statuses.values() if "simd" in status.counters]
+    each = [figures for figures in told if isinstance(figures, Mapping)]
+    if not each:
+        return {}
+    most = {name: max(figures[name] for figures in each) for name in each[0]}
+    return {"simd": {**most, "rate_hz": min(figures["rate_hz"] for figures in each)}}
 
 
 def _timing(results: Results) -> dict[str, Any]:

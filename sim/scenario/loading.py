@@ -12,6 +12,7 @@ from nodes.sources import SourceError, VideoSource
 from sim.footage import FootageError, locate
 from sim.scenario.complaints import validate
 from sim.scenario.document import Document, merge_defaults, read_document
+from sim.scenario.edges import with_edges
 from sim.scenario.model import CameraOptions, Scenario
 from sim.scenario.parsing import ScenarioError
 from sim.scenario.presets import preset_defaults
@@ -47,7 +48,8 @@ def resolve(document: Document, overrides: Iterable[tuple[str, str]] = ()) -> Sc
     document = merge_defaults(document, preset_defaults(document.data))
     scenario = validate(document, Scenario)
     try:
-        return _resolve(scenario, path.parent)
+        resolved = _resolve(scenario, path.parent)
+        return with_edges(resolved, cameras_of(resolved), path.parent)
     except (CalibrationError, FootageError, SourceError) as error:
         raise ScenarioError(f"{path}: {error}") from None
     except ValueError as error:

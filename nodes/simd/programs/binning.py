@@ -11,26 +11,22 @@ from jaxtyping import Float, UInt8
 from pydantic import Field, model_validator
 
 from network.options import Options
+from nodes.filtering.hue import FULL_SATURATION, GREY_CHROMA, GREY_SATURATION
 from nodes.simd.array import ProcessorArray
 from nodes.simd.memory import ExternalMemory, Word
 from nodes.simd.programs.arithmetic import divide
 
 MAX_BINS = 512
-"""The most bins of a histogram; one more number stands for pixels without a hue."""
+"""The most bins of a histogram."""
 
 
 class BinningOptions(Options):
     """Which colours are told apart."""
 
     space: Literal["hue", "joint_rgb"] = "hue"
-    """`hue`: of HSV, with a bin of its own for grey and dark pixels; `joint_rgb`: the three
-    together."""
+    """`hue`: of HSV, the last bin for what is too grey to have one; `joint_rgb`: the three together."""
     bins: int = Field(default=40, ge=2)
     """Bins of the hue, or along each channel."""
-    min_saturation: float = Field(default=0.15, ge=0, le=1)
-    """Below this saturation a pixel has no hue."""
-    min_value: int = Field(default=30, ge=0, le=255)
-    """Below this brightness a pixel has no hue."""
 
     @model_validator(mode="after")
     def _not_more_than_a_pixel_holds(self) -> "BinningOptions":
@@ -80,7 +76,7 @@ def bin_picture(
 
 
 def hue_bins(array: ProcessorArray, red: Word, green: Word, blue: Word, options: BinningOptions) -> None:
-    """Puts the bin of the hue into red, or `bins` where saturation or value is too low for one."""
+    """Puts the bin of the hue into red, by the rule of `nodes.filtering.hue.hue_bins`."""
     value, spread = array.word(), array.word()
     dividend, divisor = array.word(n_words=2), array.word(n_words=2)
     with array.using(value, spread, dividend, divisor):
@@ -103,18 +99,17 @@ def hue_bins(array: ProcessorArray, red: Word, green: Word, blue: Word, options:
         array.subtract(dividend, green, blue, when=is_red)
         below = array.both(is_red, array.less(green, blue))
         array.add(dividend, dividend, divisor, when=below)
-        # bin = ⌊n · 6 H C / 6 C⌋
-        array.multiply(dividend, dividend, options.bins)
+        # bin = ⌊(n - 1) · 6 H C / 6 C⌋
+        array.multiply(dividend, dividend, options.bins - 1)
         divide(array, dividend, divisor)
         array.copy(red, array.part(dividend, 0))
-        # the saturation is C / V
-        full = (1 << array.options.bits) - 1
-        array.multiply(dividend, spread, full)
+        # the saturation is C / V; what has too little of it, or of chroma, is grey
+        array.multiply(dividend, spread, FULL_SATURATION)
         array.copy(divisor, value)
         divide(array, dividend, divisor)
-        grey = array.less(array.part(dividend, 0), round(options.min_saturation * full))
-        dark = array.less(value, max(options.min_value, 1))
-        array.copy(red, options.bins, when=array.either(grey, dark))
+        pale = array.less(array.part(dividend, 0), GREY_SATURATION)
+        dull = array.less(spread, GREY_CHROMA)
+        array.copy(red, options.bins - 1, when=array.either(pale, dull))
 
 
 def channel_bins(

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 import sim
-from network.weights import MetropolisWeights
+from network.averaging.metropolis import MetropolisWeights
 from sim.scenario.model import BaselineOptions, Scenario
 
 Kind = Literal["cameras", "central", "coded"]
@@ -58,7 +58,7 @@ def central_part(scenario: Scenario, jpeg_quality: int | None = None) -> Part:
     """The central node of a run, on raw pictures or on pictures that were sent as JPEG."""
     default = type(scenario.network).model_fields
     # Neither who talks to whom nor how they fuse concerns it.
-    unused = {key: default[key].get_default() for key in ("graph", "iterations")}
+    unused = {key: default[key].get_default() for key in ("graph", "iterations", "payload")}
     network = scenario.network.model_copy(update={**unused, "consensus": MetropolisWeights()})
     scenario = scenario.model_copy(
         update={"network": network, "fusion": type(scenario).model_fields["fusion"].get_default()}

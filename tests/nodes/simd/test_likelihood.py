@@ -44,7 +44,8 @@ def measured(color, seed, sampling=None, *, batching=True, **simd):
     sampling = sampling or SamplingOptions(grid=(5, 8))
     options = SimdOptions(**{"processing_elements": 25, **simd})  # sixty boxes: three passes
     processor = SimdLikelihood(options, color, sampling, batching=batching)
-    measurement, report = processor.measure(bins, boxes, pattern, (WIDTH, HEIGHT))
+    measurement = processor.measure(bins, boxes, pattern, (WIDTH, HEIGHT))
+    report = processor.report
     counts, pixels = count(bins, boxes, pattern.book, sampling)
     distance = squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
     return measurement, report, counts, pixels, distance

@@ -126,6 +126,22 @@ def test_a_plan_has_every_combination_once(tmp_path):
     assert sum(a != b for a, b in pairwise(pictures)) == 3
 
 
+@pytest.mark.usefixtures("small")
+def test_a_random_graph_is_drawn_anew_for_every_seed(tmp_path):
+    swept = "{sweep: {network.graph.rewiring: [0.0, 1.0]}, plot: error}"
+    text = (
+        HEAD + swept + "\nruns: 6\nset: {network.graph: {kind: watts_strogatz, neighbors: 2, rewiring: 0.5}}"
+    )
+
+    regular, random = plan_experiment(read_document_of(tmp_path, text)).groups
+
+    def graphs(group):
+        return {json.dumps(json.loads(run["cameras"].scenario)["network"]["graph"]) for run in group.parts}
+
+    assert len(graphs(regular)) == 1
+    assert len(graphs(random)) > 1
+
+
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_shipped_experiments_are_planned(path):
     plan = plan_experiment(read_document(path))
