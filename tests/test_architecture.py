@@ -18,6 +18,8 @@ OUTSIDE_WORLD = {
 PURE = (
     *sorted((ROOT / "nodes/filtering").glob("*.py")),
     *sorted(path for path in (ROOT / "nodes/counting").glob("*.py") if path.name != "build.py"),
+    *sorted((ROOT / "sim/metrics").glob("*.py")),
+    ROOT / "sim/running/metrics.py",
     *sorted((ROOT / "network/averaging").glob("*.py")),
     *sorted((ROOT / "nodes/simd").rglob("*.py")),
     *(
