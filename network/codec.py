@@ -5,23 +5,24 @@ Messages between nodes are little-endian and begin with one header of 24 bytes:
 | offset | type | field |
 |---|---|---|
 | 0 | u8 | version of this layout, 1 |
-| 1 | u8 | kind in the lower four bits: 1 consensus, 2 pixels, 3 confirm, 4 state |
+| 1 | u8 | kind in the lower four bits: 1 consensus, 2 pixels, 3 confirm |
 |   |    | encoding in the next three: consensus: 0 float64, 1 float32, 2 float16; others 0 |
 |   |    | highest bit: consensus: whether links are told to be down; others 0 |
-| 2 | 3 x u16 | consensus: numbers in the payload K, round, sender's degree; pixels: height, width, 0; |
-|   |    | state: numbers in the state D, in the looks K, 0 |
+| 2 | 3 x u16 | consensus: numbers in the payload K, round, sender's degree; pixels: height, width, 0 |
 | 8 | u64 | run: BLAKE2b of its name, 8 bytes |
 | 16 | u32 | sender: BLAKE2b of its name, 4 bytes |
 | 20 | u32 | frame |
 | 24 | | consensus: K numbers, float16 ones after an i16 e and times 2^e, then 2 x u32 for each link that is |
-|    | | down, its number and a frame; pixels: height x width x 3, BGR; state: mean, upper triangle of the |
-|    | | covariance, looks |
+|    | | down, its number and a frame; pixels: height x width x 3, BGR |
+
+A preview is a JPEG that any viewer shows; what else it says is JSON in the picture's comment.
 
 Reading never trusts: what is not exactly such a message is refused with its reason.
 """
 
 import json
 import struct
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, TypeVar
 
@@ -29,6 +30,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from pydantic import TypeAdapter, ValidationError
 
+from network import jpeg
 from network.errors import RefusedMessage
 from network.header import HEADER, TELLS_DOWN, read_header, write_header
 from network.messages import (
@@ -39,6 +41,7 @@ from network.messages import (
     Message,
     PeerMessage,
     PixelsMessage,
+    PreviewMessage,
     PublicMessage,
     StateMessage,
     StatusMessage,
@@ -48,6 +51,7 @@ from network.quantization import ENCODINGS, LARGEST, Encoding, half_exponent
 
 MAX_PIXELS = 64_000_000
 MAX_JSON_BYTES = 1_000_000
+MAX_JPEG_BYTES = 20_000_000
 MAX_MAGNITUDE = LARGEST["float64"]
 """Larger numbers are refused like infinity: sums and products of them would overflow."""
 
@@ -59,7 +63,8 @@ _NUMBERS: dict[Encoding, np.dtype[np.floating]] = {
 _EXPONENT = struct.Struct("<h")
 _DOWN = struct.Struct("<II")
 _JSON: dict[type, TypeAdapter[Any]] = {
-    kind: TypeAdapter(kind) for kind in (EstimateMessage, ControlMessage, StatusMessage, TruthMessage)
+    kind: TypeAdapter(kind)
+    for kind in (EstimateMessage, ControlMessage, StateMessage, StatusMessage, TruthMessage, PreviewMessage)
 }
 _JSON_REASONS = {"json_invalid": "json", "finite_number": "not-finite", "value_error": "shape"}
 
@@ -79,8 +84,8 @@ def encode(run: str, message: Message) -> bytes:
             return encode_pixels(run, message)
         case ConfirmMessage():
             return encode_confirm(run, message)
-        case StateMessage():
-            return encode_state(run, message)
+        case PreviewMessage():
+            return encode_preview(message)
         case _:
             return encode_public(message)
 
@@ -101,8 +106,6 @@ def decode(kind: type[PeerMessage], run: str, sender: str, data: bytes) -> PeerM
         return decode_consensus(run, sender, data)
     if kind is PixelsMessage:
         return decode_pixels(run, sender, data)
-    if kind is StateMessage:
-        return decode_state(run, sender, data)
     return decode_confirm(run, sender, data)
 
 
@@ -195,65 +198,29 @@ def decode_confirm(run: str, sender: str, data: bytes) -> ConfirmMessage:
     return ConfirmMessage(sender, frame)
 
 
-def encode_state(run: str, message: StateMessage) -> bytes:
-    """What a node knows in bytes.
+def encode_preview(message: PreviewMessage) -> bytes:
+    """A preview: its picture, with everything else in the comment.
 
     Raises:
-        ValueError: A number in it is not finite.
+        ValueError: There are too many particles for a comment.
     """
-    numbers = np.concatenate([message.mean, pack_symmetric(message.covariance), message.looks])
-    if not _usable(numbers):
-        raise ValueError(f"{message.sender} has a state that is not finite in frame {message.frame}")
-    header = write_header(run, message, message.mean.size, message.looks.size, 0)
-    return header + numbers.astype(_NUMBERS["float64"], copy=False).tobytes()
+    return jpeg.with_comment(message.jpeg, _to_json(message))
 
 
-def decode_state(run: str, sender: str, data: bytes) -> StateMessage:
-    """What a node knows.
-
-    Raises:
-        RefusedMessage: The data are not such a message, or its covariance is none.
-    """
-    frame, n_states, n_looks, _, _ = read_header(StateMessage, run, sender, data)
-    triangle = n_states * (n_states + 1) // 2
-    number = _NUMBERS["float64"]
-    if len(data) != HEADER.size + number.itemsize * (n_states + triangle + n_looks):
-        raise RefusedMessage("length")
-    numbers = np.frombuffer(data, number, offset=HEADER.size)
-    if not _usable(numbers):
-        raise RefusedMessage("not-finite")
-    mean, packed, looks = np.split(numbers, [n_states, n_states + triangle])
-    covariance = unpack_symmetric(packed, n_states)
-    least = np.linalg.eigvalsh(covariance).min(initial=0.0)
-    if least < -1e-9 * np.abs(covariance).max(initial=0.0):
-        raise RefusedMessage("covariance")
-    return StateMessage(sender, frame, mean, covariance, looks)
-
-
-def encode_public(message: PublicMessage) -> bytes:
-    """A public message as one line of JSON.
-
-    Raises:
-        ValueError: A number in it is not finite.
-    """
-    fields = _JSON[type(message)].dump_python(message, mode="json")
-    return json.dumps(fields, separators=(",", ":"), allow_nan=False).encode()
-
-
-def decode_public(kind: type[_Public], data: bytes) -> _Public:
-    """A public message from JSON.
+def decode_preview(data: bytes) -> PreviewMessage:
+    """A preview; the picture itself is not looked into.
 
     Raises:
         RefusedMessage: The data are not such a message.
     """
-    if len(data) > MAX_JSON_BYTES:
+    if len(data) > MAX_JPEG_BYTES:
         raise RefusedMessage("length")
-    try:
-        message: _Public = _JSON[kind].validate_json(data)
-    except ValidationError as error:
-        found = error.errors(include_url=False, include_context=False)[0]["type"]
-        raise RefusedMessage(_JSON_REASONS.get(found, "fields")) from error
-    return message
+    parts = jpeg.without_comment(data)
+    if parts is None:
+        raise RefusedMessage("jpeg")
+    picture, comment = parts
+    message: PreviewMessage = _from_json(PreviewMessage, comment)
+    return replace(message, jpeg=picture)
 
 
 def pack_symmetric(matrix: Float[np.ndarray, "D D"]) -> Float[np.ndarray, " K"]:
@@ -283,6 +250,19 @@ def _places(size: int) -> Int[np.ndarray, "D D"]:
     rows, columns = np.triu_indices(size)
     places[rows, columns] = places[columns, rows] = np.arange(len(rows))
     return places
+
+
+def _to_json(message: PublicMessage | PreviewMessage) -> bytes:
+    fields = _JSON[type(message)].dump_python(message, mode="json")
+    return json.dumps(fields, separators=(",", ":"), allow_nan=False).encode()
+
+
+def _from_json(kind: type, data: bytes) -> Any:
+    try:
+        return _JSON[kind].validate_json(data)
+    except ValidationError as error:
+        found = error.errors(include_url=False, include_context=False)[0]["type"]
+        raise RefusedMessage(_JSON_REASONS.get(found, "fields")) from error
 
 
 def _usable(payload: Float[np.ndarray, " K"]) -> bool:

@@ -5,7 +5,7 @@ from functools import lru_cache
 from hashlib import blake2b
 
 from network.errors import RefusedMessage
-from network.messages import ConfirmMessage, ConsensusMessage, PeerMessage, PixelsMessage, StateMessage
+from network.messages import ConfirmMessage, ConsensusMessage, PeerMessage, PixelsMessage
 from network.quantization import ENCODINGS
 
 VERSION = 1
@@ -13,12 +13,7 @@ TELLS_DOWN = 0x80
 """Set in the kind of a consensus message that tells of links."""
 HEADER = struct.Struct("<BBHHHQII")
 
-_KINDS: dict[type[PeerMessage], int] = {
-    ConsensusMessage: 1,
-    PixelsMessage: 2,
-    ConfirmMessage: 3,
-    StateMessage: 4,
-}
+_KINDS: dict[type[PeerMessage], int] = {ConsensusMessage: 1, PixelsMessage: 2, ConfirmMessage: 3}
 
 
 def write_header(run: str, message: PeerMessage, a: int, b: int, c: int, code: int = 0) -> bytes:
