@@ -198,6 +198,27 @@ def decode_confirm(run: str, sender: str, data: bytes) -> ConfirmMessage:
     return ConfirmMessage(sender, frame)
 
 
+def encode_public(message: PublicMessage) -> bytes:
+    """A public message as one line of JSON.
+
+    Raises:
+        ValueError: A number in it is not finite.
+    """
+    return _to_json(message)
+
+
+def decode_public(kind: type[_Public], data: bytes) -> _Public:
+    """A public message from JSON.
+
+    Raises:
+        RefusedMessage: The data are not such a message.
+    """
+    if len(data) > MAX_JSON_BYTES:
+        raise RefusedMessage("length")
+    message: _Public = _from_json(kind, data)
+    return message
+
+
 def encode_preview(message: PreviewMessage) -> bytes:
     """A preview: its picture, with everything else in the comment.
 

@@ -37,7 +37,9 @@ class Consensus:
         neighbors: Whom it exchanges messages with, sorted by name: the order in which they are summed.
         rounds_done: Rounds done in this frame.
         done: Whether this frame's rounds are over.
-        counters: Messages that were of no use, by reason, and frames that were ``cut``.
+        counters: Messages that were of no use, by reason; those that came after their round and still served
+            (``late``); those that their round was done without (``missed``); frames that were ``cut``.
+        silent: Rounds in a row that were done without a neighbour of whom nothing was heard meanwhile.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class Consensus:
         self.rounds_done = 0
         self.done = True
         self.counters: Counter[str] = Counter()
+        self.silent: Counter[str] = Counter()
         self._algorithm, self._iterations = algorithm, iterations
         self._quantizer = quantizer or Quantizer()
         self._membership = membership or Membership(
@@ -122,6 +125,7 @@ class Consensus:
         """Takes a neighbour's message; one that is of no use is counted and dropped."""
         sender, position = message.sender, (message.frame, message.round)
         last = self._heard.get(sender)
+        self.silent.pop(sender, None)
         if last is None:
             self.counters["stranger"] += 1
         elif position == last:
@@ -154,7 +158,9 @@ class Consensus:
         """Does this round without those that are late; they take part in the next one."""
         if self.done:
             return ()
-        self.counters["late"] += len(self.waiting_for())
+        missing = self.waiting_for()
+        self.counters["missed"] += len(missing)
+        self.silent.update(missing)
         self._step()
         return self._enter_round(self._position[0]) + self._advance()
 
@@ -202,6 +208,7 @@ class Consensus:
         elif not self._algorithm.fits(self._state, message):
             self.counters["shape"] += 1
         else:
+            self.counters.update(["late"] * late)
             self._inbox[max(message.round, round_), message.sender] = message
 
     def _enter_round(self, frame: int) -> tuple[ConsensusMessage, ...]:

@@ -84,11 +84,15 @@ class Traffic:
         messages: Messages sent, by kind. One to d receivers counts d times; a public one once.
         bytes: Their payloads in bytes, counted likewise.
         refused: Peers' messages that could not be used, by reason.
+        sent: Messages of the rounds to each neighbour that was there.
+        received: Messages of the rounds that arrived from each neighbour, those that came twice twice.
     """
 
     messages: Counter[str] = field(default_factory=Counter)
     bytes: Counter[str] = field(default_factory=Counter)
     refused: Counter[str] = field(default_factory=Counter)
+    sent: Counter[str] = field(default_factory=Counter)
+    received: Counter[str] = field(default_factory=Counter)
 
     def count(self, kind: str, size_bytes: int, receivers: int) -> None:
         """Counts a message of one kind that is sent."""

@@ -131,10 +131,12 @@ class ZenohTransport:
         """Sends a message of this node to whom it concerns."""
         data = codec.encode(self._run, message)
         if isinstance(message, PeerMessage):
-            receivers = sum(name in self._alive for name in self._links.receivers(message))
+            receivers = [name for name in self._links.receivers(message) if name in self._alive]
+            self.counters.count(message.kind, len(data), len(receivers))
+            if isinstance(message, ConsensusMessage):
+                self.counters.sent.update(receivers)
         else:
-            receivers = 1
-        self.counters.count(message.kind, len(data), receivers)
+            self.counters.count(message.kind, len(data), 1)
         publisher = self._publishers[type(message)]
         # those who ask want the joint estimate, not that of one camera on its own
         if isinstance(message, StatusMessage) or (
@@ -158,9 +160,13 @@ class ZenohTransport:
                 if data == _WAKE_UP:
                     continue
                 try:
-                    return codec.decode(self._heard[sender], self._run, sender, data)
+                    message = codec.decode(self._heard[sender], self._run, sender, data)
                 except RefusedMessage as refusal:
                     self.counters.refuse(sender, refusal.reason)
+                    continue
+                if isinstance(message, ConsensusMessage):
+                    self.counters.received[sender] += 1
+                return message
         finally:
             self._wait = None
 

@@ -6,9 +6,7 @@ A node's life is four lines: announce, wait for the start, one frame after the o
 import math
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
 from threading import Event
-from typing import Literal
 
 import numpy as np
 from jaxtyping import UInt8
@@ -22,6 +20,7 @@ from network.messages import (
 )
 from network.transport import Links, Transport
 from nodes.central import Central
+from nodes.pace import Pace
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
 from nodes.telemetry import Counters, State, Telemetry
@@ -32,21 +31,6 @@ REPORT_PERIOD_S = 1.0
 """How often a node tells how it is, while somebody looks."""
 PATIENCE_S = 0.25
 """How long a wait lasts at most before the shell looks whether it has been told to stop."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pace:
-    """When frames begin and end.
-
-    Attributes:
-        kind: `lockstep` or `realtime`.
-        rate_hz: Frames a second.
-        deadline_s: In lockstep, how long a frame waits for a message before its sender counts as gone.
-    """
-
-    kind: Literal["lockstep", "realtime"]
-    rate_hz: float
-    deadline_s: float
 
 
 class Shell:

@@ -131,6 +131,10 @@ class SmartCamera:
         """A neighbour is gone: the rounds go on without it."""
         return self._with_result(self._consensus.drop(neighbor))
 
+    def on_round_deadline(self) -> Outgoing:
+        """The round's time is up: it is done without those that are late."""
+        return self._with_result(self._consensus.expire())
+
     def on_deadline(self) -> Outgoing:
         """The frame's time is up: what the rounds have reached must do."""
         self._consensus.cut()

@@ -20,6 +20,7 @@ from nodes.camera import Camera
 from nodes.central import Central
 from nodes.estimator import SirEstimator
 from nodes.filtering.observation import ObservationModel
+from nodes.pace import Pace
 from nodes.setup import Start, TrackingSetup
 from nodes.simd.likelihood import SimdLikelihood
 from nodes.smart_camera import SmartCamera
@@ -75,6 +76,12 @@ class Assembly:
     def links(self) -> Mapping[str, Links]:
         """The nodes, the central one last if there is one, and whom each exchanges messages with."""
         return links_of(self.graph, [self.scenario.central.name] if self.scenario.baselines.cpf else [])
+
+    @property
+    def pace(self) -> Pace:
+        """When frames and rounds begin and end."""
+        network = self.scenario.network
+        return Pace(self.scenario.pace, self.scenario.rate_hz, network.deadline_s, network.iterations)
 
     def prepare(self) -> None:
         """Works out what all nodes share, before they part."""

@@ -8,7 +8,7 @@ import cv2
 from threadpoolctl import threadpool_limits
 
 from network.zenoh import ZenohTransport
-from nodes.process import Pace, Shell, run_camera, run_central
+from nodes.process import Shell, run_camera, run_central
 from sim.assembly import Assembly
 from sim.scenario.parsing import ScenarioError
 
@@ -39,8 +39,7 @@ def run_node(
     links = assembly.links[name]
     late_is_lost = scenario.pace == "realtime"
     transport = ZenohTransport(scenario.name, name, links, listen, connect, drop_late_pixels=late_is_lost)
-    pace = Pace(scenario.pace, scenario.rate_hz, scenario.network.deadline_s)
-    shell = Shell(name, transport, pace, scenario.frames, stopped)
+    shell = Shell(name, transport, assembly.pace, scenario.frames, stopped)
     try:
         if links.cameras:
             run_central(assembly.central(), shell)

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, PositiveInt, model_validator
 
+from network.conditions import ConditionsOptions
 from network.graph import Edge, Graph, complete, grid, path, ring, star
 from network.keys import check_name
 from network.options import Options
@@ -103,8 +104,10 @@ class NetworkOptions(Options):
     """Rounds of consensus in a frame, t."""
     payload: PayloadOptions = PayloadOptions()
     """How many bits a number of the rounds has."""
+    conditions: ConditionsOptions = ConditionsOptions()
+    """What the links do to messages."""
     deadline_s: float = Field(default=5.0, gt=0)
-    """In lockstep, the time that a frame waits for a neighbour before it goes on without it, in s."""
+    """In lockstep, the time that a frame waits for messages before it goes on without them, in s."""
     router: str = "tcp/127.0.0.1:7447"
     """Zenoh endpoint at which the run's router serves the outside."""
     endpoints: Mapping[Name, str] = Field(default={})
@@ -248,6 +251,7 @@ class Scenario(Options):
         graph.require_connected()
         network.consensus.require_convergence(graph.max_degree)
         network.consensus.tuned(graph, network.iterations)
+        network.conditions.require_links(graph.edges, graph.names)
 
     @property
     def graph(self) -> Graph:

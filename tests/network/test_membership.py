@@ -65,7 +65,7 @@ class Network:
 
 @st.composite
 def broken(draw):
-    """A connected graph and which of its links to cut; the test makes it, beartype draws random numbers itself."""
+    """A connected graph, and which of its links to cut; beartype forbids to make it here."""
     names = NAMES[: draw(st.integers(2, 8))]
     tree = [(name, draw(st.sampled_from(names[:i]))) for i, name in enumerate(names) if i]
     extra = draw(st.lists(st.tuples(st.sampled_from(names), st.sampled_from(names)), max_size=8))
