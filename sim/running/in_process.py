@@ -171,8 +171,12 @@ class InProcess:
             return
         receiver, message = delivered
         node = self._nodes.get(receiver)
-        if (isinstance(node, SmartCamera) and isinstance(message, ConsensusMessage)) or (isinstance(node, Central) and isinstance(message, PixelsMessage)):
-            yield from self._speak(receiver, node.on_message(message))
+        replies: Iterable[Message] = ()
+        if isinstance(node, SmartCamera) and isinstance(message, ConsensusMessage):
+            replies = node.on_message(message)
+        elif isinstance(node, Central) and isinstance(message, PixelsMessage):
+            replies = node.on_message(message)
+        yield from self._speak(receiver, replies)
 
     def _speak(self, sender: str, messages: Iterable[Message]) -> Iterator[EstimateMessage]:
         for message in messages:
