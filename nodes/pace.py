@@ -20,23 +20,25 @@ class Pace:
         rate_hz: Frames a second.
         deadline_s: In lockstep, how long a frame waits for messages.
         iterations: Rounds in each frame.
+        lag_frames: In real time, how many frames more than one the rounds of a frame may take.
     """
 
     kind: PaceKind
     rate_hz: float
     deadline_s: float
     iterations: int
+    lag_frames: int = 0
 
     @property
     def budget_s(self) -> float:
         """How long a frame's rounds may take, from its begin."""
-        return self.deadline_s if self.kind == "lockstep" else 1 / self.rate_hz
+        return self.deadline_s if self.kind == "lockstep" else (1 + self.lag_frames) / self.rate_hz
 
     def begin_s(self, frame: int) -> float:
-        """When a frame begins in real time, from the begin of frame 0."""
-        return frame / self.rate_hz
+        """When a frame begins in real time, from the begin of frame 0; that one is done before the others."""
+        return (frame + (self.lag_frames if frame else 0)) / self.rate_hz
 
     def round_deadline_s(self, round_: int) -> float:
         """When a round, from 1, is done with what has come, from the frame's begin."""
-        wait_s = self.budget_s / 2
+        wait_s = self.budget_s / (1 + self.lag_frames) / 2
         return wait_s + (self.budget_s - wait_s) * round_ / max(self.iterations, 1)

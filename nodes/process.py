@@ -178,7 +178,7 @@ def _rounds(node: SmartCamera, deadline: float, shell: Shell) -> None:
             _send(node.on_lost(neighbor), shell)
         elif left <= 0 and shell.pace.kind == "realtime":
             shell.telemetry.late += 1
-            _send(node.on_deadline(), shell)
+            _send(node.on_deadline(index), shell)
         elif left <= 0:
             _send(node.on_lost(neighbor), shell)
             # Those that waited for it as well have a budget of their own.

@@ -5,7 +5,7 @@ a camera lives in this file, in the order in which it happens (Jing & Chen, sect
 """
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,10 +32,20 @@ Outgoing = tuple[ConsensusMessage | EstimateMessage, ...]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameInProgress:
-    """What a camera keeps of a frame while its neighbours' messages come in."""
+    """What a camera keeps of a frame while its neighbours' messages come in.
+
+    Attributes:
+        index: The frame.
+        picture: Its picture.
+        since: The last frame that was done when it began.
+        previous: The particles of the frame before, as far as they were known then.
+        predicted: The same, propagated.
+    """
 
     index: int
     picture: Picture
+    since: int
+    previous: Particles
     predicted: Particles
 
 
@@ -50,7 +60,7 @@ class SmartCamera:
         self,
         model: ObservationModel,
         setup: TrackingSetup,
-        consensus: Consensus,
+        lanes: Sequence[Consensus],
         single: SirEstimator | ArrayEstimator | None = None,
     ) -> None:
         """A camera before its first frame.
@@ -58,12 +68,13 @@ class SmartCamera:
         Args:
             model: The camera's observation model.
             setup: What the run tracks.
-            consensus: Its part of the averaging, which knows who takes part.
+            lanes: Its part of the averaging, which knows who takes part: one, or so many that as many frames'
+                rounds may overlap.
             single: The camera's own filter beside, as a baseline.
         """
         self.name = model.camera.name
         self._indefinite: Counter[str] = Counter(indefinite_local=0, indefinite_fused=0)
-        self._model, self._setup, self._consensus = model, setup, consensus
+        self._model, self._setup, self._lanes = model, setup, tuple(lanes)
         self._motion = setup.motion
         self._fusion_rng = setup.stream(self.name, "fusion")
         self._local_rng = setup.stream(self.name, "local")
@@ -72,8 +83,9 @@ class SmartCamera:
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
         self._estimate = setup.start.moments
-        self._frame: FrameInProgress | None = None
+        self._frames: dict[int, FrameInProgress] = {}
         self._last_frame = 0
+        self._done_frame = 0
         self._single = single
 
     def on_frame(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> Outgoing:
@@ -88,23 +100,23 @@ class SmartCamera:
         picture = self._model.look(image)
         # frames that were left out, for want of time, move the particles all the same
         for _ in range(self._last_frame + 1, index):
-            self._particles = propagate(self._particles, self._motion, self._fusion_rng)
             self._local_particles = propagate(self._local_particles, self._motion, self._local_rng)
         self._last_frame = index
         # predict: χ(k) ~ P(χ(k) | χ(k-1))
-        predicted = propagate(self._particles, self._motion, self._fusion_rng)
+        previous, predicted = self._predict(index)
         # reweight by the own picture: u, p, v, r
         local = self._filter_locally(picture, predicted)
         self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
-        self._frame = FrameInProgress(index, picture, predicted)
-        return self._with_result(self._consensus.begin(index, pack(local, self._setup.fusion)))
+        self._frames[index] = FrameInProgress(index, picture, self._done_frame, previous, predicted)
+        return self._with_result(self._lane(index).begin(index, pack(local, self._setup.fusion)))
 
     def on_message(self, message: ConsensusMessage) -> Outgoing:
         """A neighbour's value of a round has come; one that was gone is counted on again."""
-        if message.sender in self._consensus.gone and message.frame >= self._last_frame:
-            self._consensus.restore(message.sender)
-        return self._with_result(self._consensus.receive(message))
+        if message.sender in self.gone and message.frame > self._last_frame - len(self._lanes):
+            for lane in self._lanes:
+                lane.restore(message.sender)
+        return self._with_result(self._lane(message.frame).receive(message))
 
     def on_return(self, image: UInt8[np.ndarray, "H W 3"], state: StateMessage) -> None:
         """The camera was away: it goes on with what a neighbour knows.
@@ -119,7 +131,10 @@ class SmartCamera:
         known = Moments(state.mean, state.covariance)
         self._particles = setup.particles(known, self._fusion_rng)
         self._local_particles = setup.particles(known, self._local_rng)
-        self._last_frame = state.frame
+        for lane in self._lanes:
+            lane.cut()
+        self._frames.clear()
+        self._last_frame = self._done_frame = state.frame
         self._sighting = Sighting()
         if self._appearance is None:
             self._model = self._model.with_first(image)
@@ -129,15 +144,15 @@ class SmartCamera:
 
     def on_lost(self, neighbor: str) -> Outgoing:
         """A neighbour is gone: the rounds go on without it."""
-        return self._with_result(self._consensus.drop(neighbor))
+        return self._with_result(sum((lane.drop(neighbor) for lane in self._lanes), ()))
 
-    def on_round_deadline(self) -> Outgoing:
-        """The round's time is up: it is done without those that are late."""
-        return self._with_result(self._consensus.expire())
+    def on_round_deadline(self, frame: int) -> Outgoing:
+        """The time of a frame's round is up: it is done without those that are late."""
+        return self._with_result(self._lane(frame).expire())
 
-    def on_deadline(self) -> Outgoing:
-        """The frame's time is up: what the rounds have reached must do."""
-        self._consensus.cut()
+    def on_deadline(self, frame: int) -> Outgoing:
+        """A frame's time is up: what the rounds have reached must do."""
+        self._lane(frame).cut()
         return self._with_result(())
 
     def preview(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> PreviewMessage:
@@ -146,26 +161,31 @@ class SmartCamera:
         return preview(run, self.name, index, time_s, image, self._particles)
 
     @property
-    def waiting_for(self) -> tuple[str, ...]:
-        """Neighbours without whose message the frame cannot go on; none when it is done."""
-        return self._consensus.waiting_for()
+    def open_rounds(self) -> Mapping[int, int]:
+        """Frames whose rounds are not over, from the oldest on, and the round, from 1, that each is in."""
+        return {frame: lane.rounds_done + 1 for frame in self._frames if not (lane := self._lane(frame)).done}
+
+    def waiting_for(self, frame: int) -> tuple[str, ...]:
+        """Neighbours without whose message a frame cannot go on; none when it is done."""
+        return self._lane(frame).waiting_for() if frame in self._frames else ()
 
     @property
     def gone(self) -> tuple[str, ...]:
         """Neighbours that it goes on without; one that speaks again is counted on again."""
-        return self._consensus.gone
+        return self._lanes[0].gone
 
     @property
     def heard(self) -> Mapping[str, int]:
         """The latest frame in which each neighbour has spoken, -1 for one that never has."""
-        return self._consensus.heard
+        names = self._lanes[0].neighbors
+        return {name: max(lane.heard[name] for lane in self._lanes) for name in names}
 
     @property
     def state(self) -> StateMessage:
         """What a neighbour that was away needs to know."""
         looks = pack_looks(self._appearance, self._setup.filter.color)
         mean, covariance = self._estimate.mean, self._estimate.covariance
-        return StateMessage(self.name, self._last_frame, mean, covariance, looks)
+        return StateMessage(self.name, self._done_frame, mean, covariance, looks)
 
     @property
     def counters(self) -> Counters:
@@ -179,7 +199,7 @@ class SmartCamera:
         report = self._array_report
         return {
             **self._indefinite,
-            "unused": dict(self._consensus.counters),
+            "unused": dict(sum((lane.counters for lane in self._lanes), Counter[str]())),
             **({"simd": report.figures} if report else {}),
         }
 
@@ -190,19 +210,25 @@ class SmartCamera:
             return self._single.report
         return self._model.processor.report if self._model.processor else None
 
-    @property
-    def rounds_done(self) -> int:
-        """Rounds of consensus done in the frame."""
-        return self._consensus.rounds_done
-
     def _with_result(self, messages: tuple[ConsensusMessage, ...]) -> Outgoing:
-        """The messages of the rounds, and the estimates once the rounds are over."""
-        frame = self._frame
-        if frame is None or not self._consensus.done:
-            return messages
-        self._frame = None
-        estimates = self._finish_first(frame) if frame.index == 0 else self._finish(frame)
-        return (*messages, *estimates)
+        """The messages of the rounds, and the estimates of frames whose rounds are over, in their order."""
+        outgoing: Outgoing = messages
+        while self._frames and self._lane(index := min(self._frames)).done:
+            frame = self._frames.pop(index)
+            outgoing += self._finish(frame) if index else self._finish_first(frame)
+            self._done_frame = index
+        return outgoing
+
+    def _lane(self, frame: int) -> Consensus:
+        """The averaging of a frame."""
+        return self._lanes[frame % len(self._lanes)]
+
+    def _predict(self, index: int) -> tuple[Particles, Particles]:
+        """The particles of the last frame that is done, moved to the frame before this one, and to this one."""
+        previous = self._particles
+        for _ in range(self._done_frame + 1, index):
+            previous = propagate(previous, self._motion, self._fusion_rng)
+        return previous, propagate(previous, self._motion, self._fusion_rng)
 
     def _filter_locally(self, picture: Picture, predicted: Particles) -> LocalResult:
         """Eq. 9-14 on the fusion filter's particles, or on the local filter's own."""
@@ -218,20 +244,21 @@ class SmartCamera:
 
     def _finish(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
         """The second half of a frame: the fusion filter on the network's average."""
-        setup = self._setup
+        setup, previous, predicted = self._setup, frame.previous, frame.predicted
+        # frames that were under way then are done by now
+        if frame.since != self._done_frame:
+            previous, predicted = self._predict(frame.index)
         # sum: N times the average (Eq. 15-16)
-        members = self._consensus.members
-        fused = unpack(self._consensus.value, len(members), len(setup.start.mean), setup.fusion)
+        lane = self._lane(frame.index)
+        fused = unpack(lane.value, len(lane.members), len(setup.start.mean), setup.fusion)
         self._indefinite["indefinite_fused"] += not fused.is_density
         # reweight, from the prior or the optimal proposal (Eq. 17)
-        posterior = fuse(
-            self._particles, frame.predicted, fused, self._motion, setup.fusion, self._fusion_rng
-        )
+        posterior = fuse(previous, predicted, fused, self._motion, setup.fusion, self._fusion_rng)
         # estimate
         estimate = moments(posterior.states, posterior.weights)
         self._estimate = estimate
         ess = effective_sample_size(posterior)
-        prior = moments(frame.predicted.states, frame.predicted.weights)
+        prior = moments(predicted.states, predicted.weights)
         self._sighting = self._sighting.after(shrinkage_by(fused.gain, prior))
         # resample
         threshold = setup.filter.resampling.threshold
@@ -258,14 +285,14 @@ class SmartCamera:
         picture = self._model.look(image)
         position = self._setup.start.moments.position().mean
         self._appearance = self._model.first_appearance(picture, position)
-        self._frame = FrameInProgress(0, picture, self._particles)
+        self._frames[0] = FrameInProgress(0, picture, 0, self._particles, self._particles)
         looks = pack_looks(self._appearance, self._setup.filter.color)
-        return self._with_result(self._consensus.begin(0, looks))
+        return self._with_result(self._lane(0).begin(0, looks))
 
     def _finish_first(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
         """A camera that saw nothing, or something else, takes the looks that the others saw."""
         color = self._setup.filter.color
-        self._appearance = settled(self._appearance, unpack_looks(self._consensus.value, color), color)
+        self._appearance = settled(self._appearance, unpack_looks(self._lane(0).value, color), color)
         visible = self._appearance is not None and self._appearance.own
         n = float(self._setup.filter.n_particles)
         message = self._message(frame, self._setup.start.moments, n, visible=visible)
@@ -289,6 +316,6 @@ class SmartCamera:
             visible=visible,
             lost=self._sighting.lost,
             ess=ess,
-            iterations=self._consensus.rounds_done,
-            members=self._consensus.members,
+            iterations=self._lane(frame.index).rounds_done,
+            members=self._lane(frame.index).members,
         )

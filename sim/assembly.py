@@ -82,7 +82,13 @@ class Assembly:
     def pace(self) -> Pace:
         """When frames and rounds begin and end."""
         network = self.scenario.network
-        return Pace(self.scenario.pace, self.scenario.rate_hz, network.deadline_s, network.iterations)
+        return Pace(
+            self.scenario.pace,
+            self.scenario.rate_hz,
+            network.deadline_s,
+            network.iterations,
+            network.lag_frames,
+        )
 
     def prepare(self) -> None:
         """Works out what all nodes share, before they part."""
@@ -199,14 +205,17 @@ class Assembly:
         return SmartCamera(
             self.model_on_camera(name),
             self.setup,
-            Consensus(
-                name,
-                neighbors,
-                self.algorithm,
-                network.iterations,
-                quantizer,
-                Membership(name, self.graph, network.iterations),
-            ),
+            [
+                Consensus(
+                    name,
+                    neighbors,
+                    self.algorithm,
+                    network.iterations,
+                    quantizer,
+                    Membership(name, self.graph, network.iterations),
+                )
+                for _ in range(1 + network.lag_frames)
+            ],
             self.single(name),
         )
 

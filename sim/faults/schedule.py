@@ -39,11 +39,12 @@ def absences(faults: Sequence[FaultOptions]) -> tuple[Absence, ...]:
 
 def slowness_s(faults: Sequence[FaultOptions], node: str, frame: int) -> float:
     """How much longer a node takes for a frame, s."""
-    return sum(
+    longer = [
         fault.seconds
         for fault in faults
         if isinstance(fault, SlowOptions)
         and fault.node == node
         and fault.frame <= frame
         and (fault.frames is None or frame < fault.frame + fault.frames)
-    )
+    ]
+    return sum(longer, 0.0)

@@ -29,11 +29,14 @@ from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
 from nodes.telemetry import State, Telemetry
 from sim.assembly import Assembly
+from sim.faults.schedule import Absence, absences, slowness_s
 
 Told = EstimateMessage | TruthMessage | StatusMessage | PreviewMessage
 """What a run tells the outside."""
-Nodes = Mapping[str, SmartCamera | Central]
+Nodes = dict[str, SmartCamera | Central]
 """The nodes of a run by name."""
+LEASE_NS = NS
+"""How long a node that hangs still counts as there: the lease of the real network's links."""
 
 
 def run_in_process(
@@ -83,8 +86,12 @@ class InProcess:
             scenario.name, assembly.links, scenario.network.conditions, scenario.seed
         )
         self._telemetry = {name: Telemetry() for name in self._network.counters}
+        self._absences = absences(scenario.faults)
+        self._away: set[str] = set()
+        self._noticed_ns: dict[str, int] = {}  # when the others will know that a node is away
+        self._slow: dict[str, tuple[int, int]] = {}  # when a node will be done with which frame's picture
         self._now_ns = 0
-        self._begun_ns = 0  # the frame in hand
+        self._begun_ns: list[int] = []  # by frame
 
     def run(self, *, with_visibility: bool, watched: bool) -> Iterator[Told]:
         """All frames, one after the other."""
@@ -107,9 +114,25 @@ class InProcess:
 
     def _begin(self, frame: int) -> Iterator[EstimateMessage]:
         """Every camera takes its picture, and says its first."""
-        self._begun_ns = self._now_ns
+        self._begun_ns.append(self._now_ns)
         self._images = {name: source.read(frame) for name, source in sorted(self._sources.items())}
-        for name, image in self._images.items():
+        for absence in self._absences:
+            if absence.begin == frame:
+                self._leave(absence)
+            elif absence.end == frame:
+                self._return(absence)
+        for name in self._images.keys() - self._away - self._slow.keys():
+            late_ns = round(NS * slowness_s(self._assembly.scenario.faults, name, frame))
+            self._slow[name] = (self._now_ns + late_ns, frame)
+        yield from self._take_pictures()
+
+    def _take_pictures(self) -> Iterator[EstimateMessage]:
+        """The local filters of those that are done with it by now."""
+        for name, (due_ns, frame) in sorted(self._slow.items()):
+            if due_ns > self._now_ns:
+                continue
+            del self._slow[name]
+            image = self._images[name]
             if self._central is not None:
                 self._network.post(name, PixelsMessage(name, frame, image), self._now_ns)
             camera = self._cameras.get(name)
@@ -120,6 +143,40 @@ class InProcess:
             self._telemetry[name].local_filter_s.append(time.perf_counter() - began)
             yield from self._speak(name, outgoing)
 
+    def _leave(self, absence: Absence) -> None:
+        """A node is killed, which its neighbours see at once, or hangs, which they see after a lease."""
+        name = absence.node
+        self._network.leave(name)
+        self._away.add(name)
+        self._slow.pop(name, None)
+        self._noticed_ns[name] = self._now_ns + (0 if absence.forgets else LEASE_NS)
+
+    def _return(self, absence: Absence) -> None:
+        """A node is back, and goes on with the newest of what its neighbours know."""
+        name = absence.node
+        self._network.join(name)
+        self._away.discard(name)
+        self._noticed_ns.pop(name, None)
+        if name not in self._cameras:
+            return
+        if absence.forgets:
+            self._cameras[name] = self._nodes[name] = self._assembly.smart_camera(name)
+        there = [other for other in self._assembly.links[name].neighbors if other not in self._away]
+        if there:
+            state = max((self._cameras[other].state for other in there), key=lambda state: state.frame)
+            self._cameras[name].on_return(self._images[name], state)
+
+    def _notice(self) -> Iterator[EstimateMessage]:
+        """Nodes that are away are seen to be."""
+        for name, noticed_ns in sorted(self._noticed_ns.items()):
+            if noticed_ns > self._now_ns:
+                continue
+            del self._noticed_ns[name]
+            links = self._assembly.links[name]
+            for other in (*links.neighbors, *links.sinks):
+                if other in self._nodes and other not in self._away:
+                    yield from self._speak(other, self._nodes[other].on_lost(name))
+
     def _next_begin_ns(self, frame: int) -> int | None:
         """When the frame after this one begins: in lockstep when nobody waits any more, which is None."""
         if self._pace.kind == "lockstep":
@@ -129,30 +186,37 @@ class InProcess:
     def _pass_time(self, until_ns: int | None) -> Iterator[EstimateMessage]:
         """Everything that happens until then, or until nobody waits any more."""
         while True:
+            yield from self._notice()
+            yield from self._take_pictures()
             yield from self._deliver()
             deadlines = self._deadlines_ns()
-            if until_ns is None and not deadlines:
+            due = [*deadlines.values(), *(due_ns for due_ns, _ in self._slow.values())]
+            if until_ns is None and not due:
                 return
-            events = [each for each in (self._network.next_ns, *deadlines.values()) if each is not None]
-            next_ns = min(events, default=None)
-            if next_ns is None or (until_ns is not None and next_ns > until_ns):
+            events = [*due, *self._noticed_ns.values()]
+            if self._network.next_ns is not None:
+                events.append(self._network.next_ns)
+            if not events or (until_ns is not None and min(events) > until_ns):
                 break
-            self._now_ns = next_ns
+            self._now_ns = max(self._now_ns, min(events))
+            yield from self._notice()
             yield from self._deliver()
             # what arrives at the deadline is in time
-            for name, deadline_ns in deadlines.items():
-                if deadline_ns <= self._now_ns and self._deadline_ns(name) == deadline_ns:
-                    yield from self._speak(name, self._cameras[name].on_round_deadline())
+            for (name, frame, round_), deadline_ns in deadlines.items():
+                camera = self._cameras[name]
+                if deadline_ns <= self._now_ns and camera.open_rounds.get(frame) == round_:
+                    yield from self._speak(name, camera.on_round_deadline(frame))
         if until_ns is not None:
             self._now_ns = until_ns
 
-    def _deadlines_ns(self) -> dict[str, int]:
-        """When the round of each camera that waits is over."""
-        return {name: self._deadline_ns(name) for name, each in self._cameras.items() if each.waiting_for}
-
-    def _deadline_ns(self, name: str) -> int:
-        round_ = self._cameras[name].rounds_done + 1
-        return self._begun_ns + round(NS * self._pace.round_deadline_s(round_))
+    def _deadlines_ns(self) -> dict[tuple[str, int, int], int]:
+        """When each round that a camera is in is over, by camera, frame and round."""
+        return {
+            (name, frame, round_): self._begun_ns[frame] + round(NS * self._pace.round_deadline_s(round_))
+            for name, camera in self._cameras.items()
+            if name not in self._away
+            for frame, round_ in camera.open_rounds.items()
+        }
 
     def _deliver(self) -> Iterator[EstimateMessage]:
         """What has arrived, and what it brings forth at once."""
@@ -171,12 +235,10 @@ class InProcess:
             return
         receiver, message = delivered
         node = self._nodes.get(receiver)
-        replies: Iterable[Message] = ()
         if isinstance(node, SmartCamera) and isinstance(message, ConsensusMessage):
-            replies = node.on_message(message)
+            yield from self._speak(receiver, node.on_message(message))
         elif isinstance(node, Central) and isinstance(message, PixelsMessage):
-            replies = node.on_message(message)
-        yield from self._speak(receiver, replies)
+            yield from self._speak(receiver, node.on_message(message))
 
     def _speak(self, sender: str, messages: Iterable[Message]) -> Iterator[EstimateMessage]:
         for message in messages:

@@ -103,6 +103,9 @@ class NetworkOptions(Options):
     """The averaging."""
     iterations: int = Field(default=12, ge=0, le=1000)
     """Rounds of consensus in a frame, t."""
+    lag_frames: int = Field(default=0, ge=0, le=100)
+    """In real time, how many frames longer than one a frame's rounds may take: so much later comes its estimate,
+    while the next frames have begun."""
     payload: PayloadOptions = PayloadOptions()
     """How many bits a number of the rounds has."""
     conditions: ConditionsOptions = ConditionsOptions()
