@@ -105,6 +105,11 @@ class ConditionsOptions(LinkOptions):
         """Whether some link loses messages at random."""
         return any(link.loss for link in (self, *self.links))
 
+    @property
+    def latest_round_s(self) -> float:
+        """How long a message is on its way at the most, on the slowest link while its line is free, in s."""
+        return max(link.latest_s for link in (self, *self.links))
+
     def of(self, source: str, target: str) -> LinkOptions:
         """What holds for the messages from one node to another."""
         found: LinkOptions = self

@@ -36,10 +36,10 @@ class Consensus:
         name: The node.
         neighbors: Whom it exchanges messages with, sorted by name: the order in which they are summed.
         rounds_done: Rounds done in this frame.
+        rounds_in_all: Rounds done in all frames.
         done: Whether this frame's rounds are over.
         counters: Messages that were of no use, by reason; those that came after their round and still served
             (``late``); those that their round was done without (``missed``); frames that were ``cut``.
-        silent: Rounds in a row that were done without a neighbour of whom nothing was heard meanwhile.
     """
 
     def __init__(
@@ -63,10 +63,9 @@ class Consensus:
         """
         self.name = name
         self.neighbors = tuple(sorted(neighbors))
-        self.rounds_done = 0
+        self.rounds_done = self.rounds_in_all = 0
         self.done = True
         self.counters: Counter[str] = Counter()
-        self.silent: Counter[str] = Counter()
         self._algorithm, self._iterations = algorithm, iterations
         self._quantizer = quantizer or Quantizer()
         self._membership = membership or Membership(
@@ -125,7 +124,6 @@ class Consensus:
         """Takes a neighbour's message; one that is of no use is counted and dropped."""
         sender, position = message.sender, (message.frame, message.round)
         last = self._heard.get(sender)
-        self.silent.pop(sender, None)
         if last is None:
             self.counters["stranger"] += 1
         elif position == last:
@@ -158,9 +156,7 @@ class Consensus:
         """Does this round without those that are late; they take part in the next one."""
         if self.done:
             return ()
-        missing = self.waiting_for()
-        self.counters["missed"] += len(missing)
-        self.silent.update(missing)
+        self.counters["missed"] += len(self.waiting_for())
         self._step()
         return self._enter_round(self._position[0]) + self._advance()
 
@@ -248,6 +244,7 @@ class Consensus:
         received = [message for message in found if message is not None]
         self._state = self._algorithm.step(self._state, self._said, received)
         self.rounds_done += 1
+        self.rounds_in_all += 1
 
     def _finish(self) -> None:
         """Ends the frame: what still comes for it is old."""

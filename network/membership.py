@@ -26,7 +26,7 @@ class Membership:
 
         Args:
             name: The node.
-            graph: The network when all are there. Of links that it does not have, nothing is told or believed.
+            graph: The network when all are there; of links that it does not have, nothing is believed.
             iterations: Rounds in each frame: how many links a report travels in one.
         """
         self._name, self._graph = name, graph

@@ -39,6 +39,8 @@ _ENCODINGS = {
 }
 _PREVIEW_ENCODING = "image/jpeg"
 _WATCH_PERIOD_S = 0.01
+_WATCH_CLOSELY_S = 0.002
+"""The watchdog's period while somebody waits whose time is nearly up."""
 _WAKE_UP = b""
 
 _Inbox = zenoh.Subscriber[zenoh.handlers.Handler[zenoh.Sample]]
@@ -248,8 +250,11 @@ class ZenohTransport:
     def _watch(self) -> None:
         """Wakes the waiting node when its time is up."""
         woken = None
-        while not self._closed.wait(_WATCH_PERIOD_S):
+        period_s = _WATCH_PERIOD_S
+        while not self._closed.wait(period_s):
             wait = self._wait
+            left_s = _WATCH_PERIOD_S if wait is None else wait[1] - time.monotonic()
+            period_s = _WATCH_CLOSELY_S if left_s < _WATCH_PERIOD_S else _WATCH_PERIOD_S
             if wait is None or wait is woken:
                 continue
             sender, deadline = wait

@@ -5,8 +5,12 @@ late holds up the others until the round's deadline, and the frame ends in time 
 frame's time may be spent on waiting for one who is late to begin with; the rest is divided among the rounds.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Literal
+
+_WAIT = 0.5
+"""Part of a frame's time that may be spent on waiting for one who is late to begin with."""
 
 PaceKind = Literal["lockstep", "realtime"]
 
@@ -40,5 +44,17 @@ class Pace:
 
     def round_deadline_s(self, round_: int) -> float:
         """When a round, from 1, is done with what has come, from the frame's begin."""
-        wait_s = self.budget_s / (1 + self.lag_frames) / 2
+        wait_s = _WAIT * self.budget_s / (1 + self.lag_frames)
         return wait_s + (self.budget_s - wait_s) * round_ / max(self.iterations, 1)
+
+
+def lag_for(iterations: int, message_s: float, rate_hz: float) -> int:
+    """The least lag, in frames, with which a round's share of the budget is as long as a message's way.
+
+    Args:
+        iterations: Rounds in each frame.
+        message_s: How long a message is on its way, in s.
+        rate_hz: Frames a second.
+    """
+    # (1 + lag - wait) / rate / iterations >= message
+    return max(0, math.ceil(iterations * message_s * rate_hz - (1 - _WAIT)))

@@ -31,6 +31,8 @@ REPORT_PERIOD_S = 1.0
 """How often a node tells how it is, while somebody looks."""
 PATIENCE_S = 0.25
 """How long a wait lasts at most before the shell looks whether it has been told to stop."""
+TURN_S = 0.005
+"""How long it waits for one frame's messages where the rounds of several are under way."""
 
 
 class Shell:
@@ -95,19 +97,22 @@ class Shell:
         if order is not None and order.action == "stop":
             self._stopped.set()
         if self.pace.kind == "realtime":
-            early = self._start_s + index / self.pace.rate_hz - time.time()
+            early = self.begins_in_s(index)
             if early < -1 / self.pace.rate_hz and index > 0:
                 self.telemetry.late += 1
                 return False
             self._stopped.wait(max(0.0, early))
         return not self.stopped
 
-    def deadline(self, index: int) -> float:
-        """When a frame that begins now has to be done, on the monotonic clock."""
+    def begins_in_s(self, index: int) -> float:
+        """How long it is until a frame's time; in lockstep, frames begin at once."""
         if self.pace.kind == "lockstep":
-            return time.monotonic() + self.pace.deadline_s
-        left = self._start_s + (index + 1) / self.pace.rate_hz - time.time()
-        return time.monotonic() + left
+            return 0.0
+        return self._start_s + self.pace.begin_s(index) - time.time()
+
+    def began(self, index: int) -> float:
+        """When a frame that begins now is taken to have begun, on the monotonic clock."""
+        return time.monotonic() + self.begins_in_s(index)
 
     def show(self, node: SmartCamera, index: int, image: UInt8[np.ndarray, "H W 3"]) -> None:
         """Shows a frame that is done to those who look, if anybody does."""
@@ -139,6 +144,7 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
     if not shell.wait_for_start(links.neighbors + links.sinks):
         return
     confirmed, done = -1.0, -1
+    begun: dict[int, float] = {}
     for index in range(shell.frames):
         if not shell.await_frame(index):
             continue
@@ -153,36 +159,62 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         outgoing = node.on_frame(index, image)
         shell.telemetry.local_filter_s.append(time.perf_counter() - began)
         # rounds with the neighbours, and the fusion filter at their end
-        began = time.perf_counter()
         _send(outgoing, shell)
-        _rounds(node, shell.deadline(index), shell)
-        shell.telemetry.consensus_round_s.append((time.perf_counter() - began) / max(node.rounds_done, 1))
+        begun[index] = shell.began(index)
+        begun = {each: begun[each] for each in node.open_rounds}
+        _rounds(node, begun, shell, frame=index + 1)
         done = done if shell.stopped else index
         if index == 0:
             shell.report("running", index, node.counters)
         shell.show(node, index, image)
+    _rounds(node, begun, shell)
     source.close()
     shell.report("failed" if shell.stopped else "done", done, node.counters)
     shell.wait_for_stop()
 
 
-def _rounds(node: SmartCamera, deadline: float, shell: Shell) -> None:
-    """Passes messages between the neighbours and the node until the frame is done."""
-    while node.waiting_for and not shell.stopped:
-        neighbor = node.waiting_for[0]
-        left = deadline - time.monotonic()
-        message = shell.transport.receive(neighbor, min(max(left, 0.0), PATIENCE_S))
-        if isinstance(message, ConsensusMessage):
-            _send(node.on_message(message), shell)
-        elif not shell.transport.alive(neighbor):
-            _send(node.on_lost(neighbor), shell)
-        elif left <= 0 and shell.pace.kind == "realtime":
+def _rounds(node: SmartCamera, begun: dict[int, float], shell: Shell, frame: int | None = None) -> None:
+    """Passes messages between the neighbours and the node until its frames are done.
+
+    Args:
+        node: The node.
+        begun: When its frames began, on the monotonic clock.
+        shell: Its shell.
+        frame: In real time, the frame at whose time the rounds of those before it are left for later.
+    """
+    began, rounds = time.perf_counter(), node.rounds_done
+    realtime = shell.pace.kind == "realtime"
+    while (under_way := list(node.open_rounds)) and not shell.stopped:
+        left_s = shell.begins_in_s(frame) if frame is not None and realtime else PATIENCE_S
+        if left_s <= 0:
+            break
+        for index in under_way:
+            patience_s = min(left_s, PATIENCE_S if len(under_way) == 1 else TURN_S)
+            _wait(node, index, begun[index], patience_s, shell)
+    # those of which the time is up
+    for index in list(node.open_rounds):
+        if frame is not None and index + shell.pace.lag_frames < frame:
             shell.telemetry.late += 1
             _send(node.on_deadline(index), shell)
-        elif left <= 0:
-            _send(node.on_lost(neighbor), shell)
-            # Those that waited for it as well have a budget of their own.
-            deadline = time.monotonic() + shell.pace.deadline_s
+    rounds = max(node.rounds_done - rounds, 1)
+    shell.telemetry.consensus_round_s.append((time.perf_counter() - began) / rounds)
+
+
+def _wait(node: SmartCamera, index: int, begun: float, patience_s: float, shell: Shell) -> None:
+    """Waits for the next message of a frame, or for the end of the round that it is in."""
+    round_ = node.open_rounds.get(index)
+    if round_ is None:
+        return
+    neighbor = node.waiting_for(index)[0]
+    deadline = begun + shell.pace.round_deadline_s(round_)
+    left_s = max(deadline - time.monotonic(), 0.0)
+    message = shell.transport.receive(neighbor, min(left_s, patience_s))
+    if isinstance(message, ConsensusMessage):
+        _send(node.on_message(message), shell)
+    elif not shell.transport.alive(neighbor):
+        _send(node.on_lost(neighbor), shell)
+    elif time.monotonic() >= deadline:
+        _send(node.on_round_deadline(index), shell)
 
 
 def _await_confirmation(sink: str, frame: int, confirmed: float, shell: Shell) -> float:
@@ -207,7 +239,7 @@ def run_central(node: Central, shell: Shell) -> None:
     while node.frame < shell.frames and node.cameras and not shell.stopped:
         index = node.frame
         shell.await_frame(index)
-        deadline = shell.deadline(index)
+        deadline = shell.began(index) + shell.pace.budget_s
         while node.frame == index and node.cameras and not shell.stopped:
             camera = node.waiting_for[0]
             left = deadline - time.monotonic()
@@ -219,7 +251,7 @@ def run_central(node: Central, shell: Shell) -> None:
                     shell.telemetry.local_filter_s.append(time.perf_counter() - began)
             elif not shell.transport.alive(camera) or (left <= 0 and shell.pace.kind == "lockstep"):
                 _send(node.on_lost(camera), shell)
-                deadline = shell.deadline(index)
+                deadline = shell.began(index) + shell.pace.budget_s
             elif left <= 0:
                 shell.telemetry.late += 1
                 _send(node.on_deadline(), shell)

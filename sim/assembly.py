@@ -87,7 +87,7 @@ class Assembly:
             self.scenario.rate_hz,
             network.deadline_s,
             network.iterations,
-            network.lag_frames,
+            self.scenario.lag_frames,
         )
 
     def prepare(self) -> None:
@@ -214,7 +214,7 @@ class Assembly:
                     quantizer,
                     Membership(name, self.graph, network.iterations),
                 )
-                for _ in range(1 + network.lag_frames)
+                for _ in range(1 + self.scenario.lag_frames)
             ],
             self.single(name),
         )

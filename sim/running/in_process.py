@@ -235,10 +235,12 @@ class InProcess:
             return
         receiver, message = delivered
         node = self._nodes.get(receiver)
+        replies: Iterable[Message] = ()
         if isinstance(node, SmartCamera) and isinstance(message, ConsensusMessage):
-            yield from self._speak(receiver, node.on_message(message))
+            replies = node.on_message(message)
         elif isinstance(node, Central) and isinstance(message, PixelsMessage):
-            yield from self._speak(receiver, node.on_message(message))
+            replies = node.on_message(message)
+        yield from self._speak(receiver, replies)
 
     def _speak(self, sender: str, messages: Iterable[Message]) -> Iterator[EstimateMessage]:
         for message in messages:

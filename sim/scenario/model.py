@@ -13,6 +13,7 @@ from network.quantization import PayloadOptions
 from network.weights import ConsensusOptions
 from nodes.filtering.fusion import FusionOptions
 from nodes.filtering.target import TargetOptions
+from nodes.pace import lag_for
 from nodes.setup import FilterOptions
 from sim.faults.options import FaultOptions, require_possible
 from sim.scenario.graphs import DescribedGraph
@@ -103,9 +104,9 @@ class NetworkOptions(Options):
     """The averaging."""
     iterations: int = Field(default=12, ge=0, le=1000)
     """Rounds of consensus in a frame, t."""
-    lag_frames: int = Field(default=0, ge=0, le=100)
-    """In real time, how many frames longer than one a frame's rounds may take: so much later comes its estimate,
-    while the next frames have begun."""
+    lag_frames: int | None = Field(default=None, ge=0, le=100)
+    """In real time, how many frames longer than one the rounds of a frame may take: so much later comes its
+    estimate, while the next frames have begun. null: as many as the conditions' delays ask for."""
     payload: PayloadOptions = PayloadOptions()
     """How many bits a number of the rounds has."""
     conditions: ConditionsOptions = ConditionsOptions()
@@ -278,6 +279,20 @@ class Scenario(Options):
         if isinstance(graph, tuple):
             return Graph.from_edges(names, graph)
         raise ValueError(f"the {graph.kind} graph of {self.name} is not worked out: load the scenario")
+
+    @property
+    def lag_frames(self) -> int:
+        """How many frames more than one the rounds of a frame may take; none in lockstep, which waits.
+
+        Raises:
+            ValueError: The links are too slow for the rounds.
+        """
+        network = self.network
+        if self.pace == "lockstep":
+            return 0
+        if network.lag_frames is not None:
+            return network.lag_frames
+        return lag_for(network.iterations, network.conditions.latest_round_s, self.rate_hz)
 
     @property
     def n_processes(self) -> int:
