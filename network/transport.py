@@ -19,6 +19,7 @@ from network.messages import (
     PeerMessage,
     PixelsMessage,
     PreviewMessage,
+    StateMessage,
     StatusMessage,
 )
 
@@ -145,6 +146,12 @@ class Transport(Protocol):
         Returns:
             Its message, None when time is up or the sender is gone.
         """
+
+    def offer(self, state: StateMessage) -> None:
+        """Keeps what this node knows, for neighbours that ask."""
+
+    def ask(self, name: str, timeout_s: float) -> StateMessage | None:
+        """What another node knows, None where it does not answer in time or has nothing to tell."""
 
     def close(self) -> None:
         """Leaves the network, within seconds whatever the others do."""

@@ -26,6 +26,7 @@ from network.messages import (
     PeerMessage,
     PixelsMessage,
     PreviewMessage,
+    StateMessage,
     StatusMessage,
     TruthMessage,
 )
@@ -86,6 +87,7 @@ class ZenohTransport:
         self._alive_changed = threading.Condition()
         self._orders: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._latest: dict[str, bytes] = {}
+        self._state: StateMessage | None = None
         self._wait: tuple[str, float] | None = None
         self._closed = threading.Event()
         self._session = sessions.open_peer(listen, connect)
@@ -172,6 +174,24 @@ class ZenohTransport:
         finally:
             self._wait = None
 
+    def offer(self, state: StateMessage) -> None:
+        """Keeps what this node knows, for neighbours that ask."""
+        self._state = state
+
+    def ask(self, name: str, timeout_s: float) -> StateMessage | None:
+        """What another node knows, None where it does not answer in time or has nothing to tell."""
+        for reply in self._session.get(keys.state(self._run, name), timeout=timeout_s):
+            if reply.ok is None:
+                continue
+            try:
+                state = codec.decode_public(StateMessage, reply.ok.payload.to_bytes())
+            except RefusedMessage as refusal:
+                self.counters.refuse(name, refusal.reason)
+                continue
+            if state.node == name:
+                return state
+        return None
+
     def close(self) -> None:
         """Leaves the network, within seconds whatever the others do."""
         self._closed.set()
@@ -186,6 +206,8 @@ class ZenohTransport:
         self._session.declare_subscriber(keys.control(self._run), zenoh.handlers.Callback(self._on_order))
         for key in (keys.status(self._run, self._name), keys.estimate(self._run, self._name)):
             self._session.declare_queryable(key, zenoh.handlers.Callback(partial(self._answer, key)))
+        state_key = keys.state(self._run, self._name)
+        self._session.declare_queryable(state_key, zenoh.handlers.Callback(self._answer_state))
 
     def _on_order(self, sample: zenoh.Sample) -> None:
         self._orders.put(sample.payload.to_bytes())
@@ -195,6 +217,12 @@ class ZenohTransport:
         with query:
             if key in self._latest:
                 query.reply(key, self._latest[key])
+
+    def _answer_state(self, query: zenoh.Query) -> None:
+        # Put into bytes here, since hardly anybody ever asks.
+        with query:
+            if self._state is not None:
+                query.reply(keys.state(self._run, self._name), codec.encode_public(self._state))
 
     def _declare_publishers(self, *, drop_late_pixels: bool) -> dict[type, zenoh.Publisher]:
         run, name = self._run, self._name

@@ -21,6 +21,7 @@ from network.messages import (
 from network.transport import Links, Transport
 from nodes.central import Central
 from nodes.pace import Pace
+from nodes.returning import LEAD, Returning
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
 from nodes.telemetry import Counters, State, Telemetry
@@ -63,10 +64,14 @@ class Shell:
         self.transport.announce()
         while not self.stopped:
             missing = self.transport.wait_until_alive(linked, PATIENCE_S)
-            if not missing:
+            # Where a run is under way, those that are missing may be so for good.
+            ready = not missing or any(
+                self.transport.ask(name, PATIENCE_S) for name in linked if name not in missing
+            )
+            if ready:
                 # Said again until the start, for a launcher that comes later.
                 self.report("ready", -1, {})
-            order = self.transport.wait_for_control(0 if missing else PATIENCE_S)
+            order = self.transport.wait_for_control(PATIENCE_S if ready else 0)
             if order is not None:
                 return self._obey(order)
         return False
@@ -145,10 +150,18 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         return
     confirmed, done = -1.0, -1
     begun: dict[int, float] = {}
-    for index in range(shell.frames):
-        if not shell.await_frame(index):
+    returning = Returning(shell.transport, links.neighbors, shell.pace)
+    index, state = 0, returning.newest()
+    while index < shell.frames:
+        # who was away goes on ahead of the others
+        if state is not None:
+            index = max(index, state.frame + LEAD)
+        if index >= shell.frames or not shell.await_frame(index):
+            index += 1
             continue
         image = source.read(index) if index else first
+        if state is not None:
+            node.on_return(image, state)
         # pixels to the central node, which confirms them in lockstep
         if links.sinks:
             if shell.pace.kind == "lockstep":
@@ -163,10 +176,13 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         begun[index] = shell.began(index)
         begun = {each: begun[each] for each in node.open_rounds}
         _rounds(node, begun, shell, frame=index + 1)
-        done = done if shell.stopped else index
-        if index == 0:
+        shell.transport.offer(node.state)
+        if done < 0 and not shell.stopped:
             shell.report("running", index, node.counters)
+        done = done if shell.stopped else index
         shell.show(node, index, image)
+        index += 1
+        state = returning.missed(node, index)
     _rounds(node, begun, shell)
     source.close()
     shell.report("failed" if shell.stopped else "done", done, node.counters)
@@ -232,13 +248,19 @@ def _await_confirmation(sink: str, frame: int, confirmed: float, shell: Shell) -
     return confirmed
 
 
-def run_central(node: Central, shell: Shell) -> None:
+def run_central(node: Central, links: Links, shell: Shell) -> None:
     """The life of the central node."""
     if not shell.wait_for_start(node.cameras):
         return
     while node.frame < shell.frames and node.cameras and not shell.stopped:
         index = node.frame
         shell.await_frame(index)
+        # cameras that were gone and send again
+        for camera in sorted(set(links.cameras) - node.cameras):
+            if not shell.transport.alive(camera):
+                continue
+            if isinstance(message := shell.transport.receive(camera, 0), PixelsMessage):
+                _send(node.on_message(message), shell)
         deadline = shell.began(index) + shell.pace.budget_s
         while node.frame == index and node.cameras and not shell.stopped:
             camera = node.waiting_for[0]
