@@ -59,6 +59,9 @@ class Results:
                 self.tracks.setdefault((message.estimator, message.node), {})[message.frame] = message
             case TruthMessage():
                 self.truth[message.frame] = message
+            case StatusMessage(state="ready"):
+                # a node that was started again counts from 0
+                self.first_statuses.pop(message.node, None)
             case StatusMessage(state="running"):
                 self.first_statuses.setdefault(message.node, message)
             case StatusMessage(state="done" | "failed"):
