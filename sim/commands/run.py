@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -24,6 +24,7 @@ from sim.commands.shared import (
     length_text,
     progress_bar,
     read_scenario,
+    tell_advice,
     yes_no,
 )
 from sim.running.in_process import run_in_process
@@ -67,6 +68,9 @@ def run(
     # What is wrong with the start or the truth shall be said before anything is written.
     _ = assembly.start, assembly.truth
     _check_by_hand(by_hand or [], assembly, in_process=in_process)
+    if not in_process:
+        assembly.require_real_links()
+    tell_advice(chosen)
     if live and in_process:
         raise typer.BadParameter("with --in-process, nothing goes over the network", param_hint="--live")
     with ExitStack() as stack:
@@ -149,6 +153,8 @@ def _print(summary: dict[str, Any], scenario: Scenario, folder: Path) -> None:
         apart = length_text(length(summary, "disagreement"), unit)
         console.print(f"nodes disagree by {apart} in the mean")
     console.print(f"bytes a frame: DCPF {sent['dcpf']:,.0f}, CPF {sent['cpf']:,.0f}")
+    for line in _trouble_lines(summary["network"]):
+        console.print(line)
     indefinite = summary["fusion"]["indefinite_local_fraction"]
     if indefinite:
         console.print(f"Eq. 17's ratio was no density in {indefinite:.0%} of the local results")
@@ -161,6 +167,16 @@ def _print(summary: dict[str, Any], scenario: Scenario, folder: Path) -> None:
     if summary["died"]:
         console.print(f"did not reach the end: {', '.join(summary['died'])}")
     console.print(f"recorded in {folder}", soft_wrap=True)
+
+
+def _trouble_lines(network: dict[str, Any]) -> Iterator[str]:
+    """What bad links have done, if they have."""
+    troubles = {"lost": "lost", "late_messages": "late", "duplicated": "duplicated", "dropped": "dropped"}
+    if any(network[key] for key in troubles):
+        counted = ", ".join(f"{network[key]:,} {text}" for key, text in troubles.items())
+        yield f"messages of the rounds: {counted}"
+    if network["lag_s"]:
+        yield f"estimates come {network['lag_s']:g} s after their pictures"
 
 
 def _array_text(cost: dict[str, float], words: int) -> str:

@@ -235,12 +235,11 @@ class InProcess:
             return
         receiver, message = delivered
         node = self._nodes.get(receiver)
-        replies: Iterable[Message] = ()
         if isinstance(node, SmartCamera) and isinstance(message, ConsensusMessage):
-            replies = node.on_message(message)
-        elif isinstance(node, Central) and isinstance(message, PixelsMessage):
-            replies = node.on_message(message)
-        yield from self._speak(receiver, replies)
+            yield from self._speak(receiver, node.on_message(message))
+            return
+        if isinstance(node, Central) and isinstance(message, PixelsMessage):
+            yield from self._speak(receiver, node.on_message(message))
 
     def _speak(self, sender: str, messages: Iterable[Message]) -> Iterator[EstimateMessage]:
         for message in messages:

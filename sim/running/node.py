@@ -32,6 +32,7 @@ def run_node(
         SourceError: The camera's video cannot be read.
     """
     scenario = assembly.scenario
+    assembly.require_real_links()
     if name not in assembly.links:
         raise ScenarioError(f"{scenario.name} has no node {name}: its nodes are {', '.join(assembly.links)}")
     # One thread a process: as many processes as cameras share the cores.

@@ -1,6 +1,5 @@
 """What a run has found, collected estimate by estimate, and its summary."""
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,6 +20,7 @@ from sim.running.metrics import (
     position_errors,
     rmse,
 )
+from sim.running.traffic import network_figures
 from sim.scenario.model import Scenario
 
 Track = tuple[str, str]
@@ -160,7 +160,7 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
             "dcpf": _tracking(results, list(dcpf.values())),
             "cpf": _tracking(results, [cpf] if cpf else []),
         },
-        "network": _network(results),
+        "network": network_figures(scenario, results.first_statuses, results.statuses),
         "fusion": _fusion(results),
         **_array(results),
         "timing": {**results.timing, **_timing(results)},
@@ -227,40 +227,6 @@ def _tracking(results: Results, tracks: list[Track]) -> dict[str, float | None] 
         "losses_per_node": len(each) / len(known),
         "reacquired_after_s": float(np.mean(found_after)) / results.scenario.rate_hz if found_after else None,
     }
-
-
-def _network(results: Results) -> dict[str, Any]:
-    """Messages and bytes as the transports counted them, to each receiver.
-
-    The figures a frame are means over the frames after frame 0, in which the cameras exchange what the target
-    looks like: its bytes stand apart. Nodes that died on the way have told no total and are left out.
-    """
-    frames = results.scenario.frames - 1
-    last = results.statuses
-    first = {node: status for node, status in results.first_statuses.items() if node in last}
-    sent = _total(last, "messages")["consensus"] - _total(first, "messages")["consensus"]
-    at_start, octets = _total(first, "bytes"), _total(last, "bytes")
-    return {
-        "iterations": results.scenario.network.iterations,
-        "messages_per_frame": round(sent / frames, 3),
-        "bytes_per_frame": {
-            "dcpf": round((octets["consensus"] - at_start["consensus"]) / frames, 1),
-            "cpf": round((octets["pixels"] - at_start["pixels"]) / frames, 1),
-        },
-        "bytes_at_start": {"dcpf": at_start["consensus"], "cpf": at_start["pixels"]},
-        "late": sum(int(_plain(status.counters.get("late"))) for status in last.values()),
-        "refused": int(_total(last, "refused").total()),
-        "unused": dict(_total(last, "unused")),
-    }
-
-
-def _total(statuses: Mapping[str, StatusMessage], group: str) -> Counter[str]:
-    total: Counter[str] = Counter()
-    for status in statuses.values():
-        counted = status.counters.get(group)
-        for kind, number in (counted if isinstance(counted, Mapping) else {}).items():
-            total[kind] += int(number)
-    return total
 
 
 def _fusion(results: Results) -> dict[str, Any]:

@@ -282,16 +282,16 @@ class Scenario(Options):
 
     @property
     def lag_frames(self) -> int:
-        """How many frames more than one the rounds of a frame may take; none in lockstep, which waits.
-
-        Raises:
-            ValueError: The links are too slow for the rounds.
-        """
-        network = self.network
+        """How many frames more than one the rounds of a frame may take; none in lockstep, which waits."""
         if self.pace == "lockstep":
             return 0
-        if network.lag_frames is not None:
-            return network.lag_frames
+        asked = self.network.lag_frames
+        return self.needed_lag_frames if asked is None else asked
+
+    @property
+    def needed_lag_frames(self) -> int:
+        """The lag that the conditions' delays ask for in real time."""
+        network = self.network
         return lag_for(network.iterations, network.conditions.latest_round_s, self.rate_hz)
 
     @property
