@@ -256,11 +256,7 @@ def run_central(node: Central, links: Links, shell: Shell) -> None:
         index = node.frame
         shell.await_frame(index)
         # cameras that were gone and send again
-        for camera in sorted(set(links.cameras) - node.cameras):
-            if not shell.transport.alive(camera):
-                continue
-            if isinstance(message := shell.transport.receive(camera, 0), PixelsMessage):
-                _send(node.on_message(message), shell)
+        _read(node, set(links.cameras) - node.cameras, shell)
         deadline = shell.began(index) + shell.pace.budget_s
         while node.frame == index and node.cameras and not shell.stopped:
             camera = node.waiting_for[0]
@@ -277,14 +273,21 @@ def run_central(node: Central, links: Links, shell: Shell) -> None:
             elif left <= 0:
                 shell.telemetry.late += 1
                 # those behind the one that was waited for
-                for other in node.waiting_for:
-                    if isinstance(message := shell.transport.receive(other, 0), PixelsMessage):
-                        _send(node.on_message(message), shell)
+                _read(node, node.waiting_for, shell)
                 if node.frame == index:
                     _send(node.on_deadline(), shell)
         shell.report_now_and_then(node.frame - 1, {})
     shell.report("done" if node.frame == shell.frames else "failed", node.frame - 1, {})
     shell.wait_for_stop()
+
+
+def _read(node: Central, cameras: Iterable[str], shell: Shell) -> None:
+    """Takes what has come from cameras, without waiting."""
+    for camera in sorted(cameras):
+        if shell.transport.alive(camera):
+            message = shell.transport.receive(camera, 0)
+            if isinstance(message, PixelsMessage):
+                _send(node.on_message(message), shell)
 
 
 def _send(messages: Iterable[ConsensusMessage | EstimateMessage | ConfirmMessage], shell: Shell) -> None:

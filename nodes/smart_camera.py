@@ -6,7 +6,6 @@ a camera lives in this file, in the order in which it happens (Jing & Chen, sect
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -22,36 +21,14 @@ from nodes.filtering.local import LocalResult, local_filter
 from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.particles import Particles, effective_sample_size, resample_if_degenerate
 from nodes.filtering.sighting import Sighting, shrinkage_by
+from nodes.frame import FrameInProgress, is_new
 from nodes.preview import preview
+from nodes.rounds import Rounds
 from nodes.setup import TrackingSetup
 from nodes.simd.report import FrameReport
 from nodes.telemetry import Counters
 
-SILENT_ROUNDS = 12
-"""Rounds in a row without a word of a neighbour after which it is gone; 0.3 to this power is 5e-7."""
-
 Outgoing = tuple[ConsensusMessage | EstimateMessage, ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FrameInProgress:
-    """What a camera keeps of a frame while its neighbours' messages come in.
-
-    Attributes:
-        index: The frame.
-        picture: Its picture.
-        since: The last frame that was done when it began.
-        previous: The particles of the frame before, as far as they were known then.
-        predicted: The same, propagated.
-        fresh: Whether the picture is another than the one before.
-    """
-
-    index: int
-    picture: Picture
-    since: int
-    previous: Particles
-    predicted: Particles
-    fresh: bool = True
 
 
 class SmartCamera:
@@ -79,7 +56,7 @@ class SmartCamera:
         """
         self.name = model.camera.name
         self._indefinite: Counter[str] = Counter(indefinite_local=0, indefinite_fused=0)
-        self._model, self._setup, self._lanes = model, setup, tuple(lanes)
+        self._model, self._setup, self._rounds = model, setup, Rounds(lanes)
         self._motion = setup.motion
         self._fusion_rng = setup.stream(self.name, "fusion")
         self._local_rng = setup.stream(self.name, "local")
@@ -90,7 +67,6 @@ class SmartCamera:
         self._image: UInt8[np.ndarray, "H W 3"] | None = None
         self._estimate = setup.start.moments
         self._frames: dict[int, FrameInProgress] = {}
-        self._silent: Counter[str] = Counter()
         self._last_frame = 0
         self._done_frame = 0
         self._single = single
@@ -112,20 +88,17 @@ class SmartCamera:
         # predict: χ(k) ~ P(χ(k) | χ(k-1))
         previous, predicted = self._predict(index)
         # reweight by the own picture: u, p, v, r
-        fresh = self._is_new(image)
+        fresh = is_new(image, self._image)
+        self._image = image
         local = self._filter_locally(picture, predicted, self._appearance if fresh else None)
         self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
         self._frames[index] = FrameInProgress(index, picture, self._done_frame, previous, predicted, fresh)
-        return self._with_result(self._lane(index).begin(index, pack(local, self._setup.fusion)))
+        return self._with_result(self._rounds.begin(index, pack(local, self._setup.fusion)))
 
     def on_message(self, message: ConsensusMessage) -> Outgoing:
         """A neighbour's value of a round has come; one that was gone is counted on again."""
-        self._silent.pop(message.sender, None)
-        if message.sender in self.gone and message.frame > self._last_frame - len(self._lanes):
-            for lane in self._lanes:
-                lane.restore(message.sender)
-        return self._with_result(self._lane(message.frame).receive(message))
+        return self._with_result(self._rounds.receive(message))
 
     def on_return(self, image: UInt8[np.ndarray, "H W 3"], state: StateMessage) -> None:
         """The camera was away: it goes on with what a neighbour knows.
@@ -140,8 +113,7 @@ class SmartCamera:
         known = Moments(state.mean, state.covariance)
         self._particles = setup.particles(known, self._fusion_rng)
         self._local_particles = setup.particles(known, self._local_rng)
-        for lane in self._lanes:
-            lane.cut()
+        self._rounds.cut()
         self._frames.clear()
         self._last_frame = self._done_frame = state.frame
         self._sighting = Sighting()
@@ -153,23 +125,15 @@ class SmartCamera:
 
     def on_lost(self, neighbor: str) -> Outgoing:
         """A neighbour is gone: the rounds go on without it."""
-        self._silent.pop(neighbor, None)
-        return self._with_result(sum((lane.drop(neighbor) for lane in self._lanes), ()))
+        return self._with_result(self._rounds.lose(neighbor))
 
     def on_round_deadline(self, frame: int) -> Outgoing:
-        """The time of a frame's round is up: it is done without those that are late.
-
-        Who has said nothing for a whole dozen of rounds is taken to be gone.
-        """
-        self._silent.update(self.waiting_for(frame))
-        outgoing = self._with_result(self._lane(frame).expire())
-        for name in sorted(name for name, rounds in self._silent.items() if rounds >= SILENT_ROUNDS):
-            outgoing += self.on_lost(name)
-        return outgoing
+        """The time of a frame's round is up: it is done without those that are late."""
+        return self._with_result(self._rounds.expire(frame))
 
     def on_deadline(self, frame: int) -> Outgoing:
         """A frame's time is up: what the rounds have reached must do."""
-        self._lane(frame).cut()
+        self._rounds.of(frame).cut()
         return self._with_result(())
 
     def preview(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> PreviewMessage:
@@ -180,22 +144,18 @@ class SmartCamera:
     @property
     def open_rounds(self) -> Mapping[int, int]:
         """Frames whose rounds are not over, from the oldest on, and the round, from 1, that each is in."""
-        return {frame: lane.rounds_done + 1 for frame in self._frames if not (lane := self._lane(frame)).done}
+        return {
+            frame: lane.rounds_done + 1 for frame in self._frames if not (lane := self._rounds.of(frame)).done
+        }
 
     def waiting_for(self, frame: int) -> tuple[str, ...]:
         """Neighbours without whose message a frame cannot go on; none when it is done."""
-        return self._lane(frame).waiting_for() if frame in self._frames else ()
-
-    @property
-    def gone(self) -> tuple[str, ...]:
-        """Neighbours that it goes on without; one that speaks again is counted on again."""
-        return self._lanes[0].gone
+        return self._rounds.of(frame).waiting_for() if frame in self._frames else ()
 
     @property
     def heard(self) -> Mapping[str, int]:
         """The latest frame in which each neighbour has spoken, -1 for one that never has."""
-        names = self._lanes[0].neighbors
-        return {name: max(lane.heard[name] for lane in self._lanes) for name in names}
+        return self._rounds.heard
 
     @property
     def state(self) -> StateMessage:
@@ -207,21 +167,20 @@ class SmartCamera:
     @property
     def rounds_done(self) -> int:
         """Rounds of consensus done since the first frame."""
-        return sum(lane.rounds_in_all for lane in self._lanes)
+        return self._rounds.done
 
     @property
     def counters(self) -> Counters:
         """What it has counted.
 
         Frames in which the local (`indefinite_local`) or the fused (`indefinite_fused`) difference of
-        information matrices was not positive semidefinite, so that Eq. 17 had no density; and messages
-        of the rounds that were of no use, by reason (`unused`); the cost of a frame on the emulated array
-        (`simd`), if there is one.
+        information matrices was not positive semidefinite, so that Eq. 17 had no density; messages of the
+        rounds that were of no use, by reason (`unused`); what a frame costs on the emulated array (`simd`).
         """
         report = self._array_report
         return {
             **self._indefinite,
-            "unused": dict(sum((lane.counters for lane in self._lanes), Counter[str]())),
+            "unused": self._rounds.counters,
             **({"simd": report.figures} if report else {}),
         }
 
@@ -235,15 +194,11 @@ class SmartCamera:
     def _with_result(self, messages: tuple[ConsensusMessage, ...]) -> Outgoing:
         """The messages of the rounds, and the estimates of the frames whose rounds are over."""
         outgoing: Outgoing = messages
-        while self._frames and self._lane(index := min(self._frames)).done:
+        while self._frames and self._rounds.of(index := min(self._frames)).done:
             frame = self._frames.pop(index)
             outgoing += self._finish(frame) if index else self._finish_first(frame)
             self._done_frame = index
         return outgoing
-
-    def _lane(self, frame: int) -> Consensus:
-        """The averaging of a frame."""
-        return self._lanes[frame % len(self._lanes)]
 
     def _predict(self, index: int) -> tuple[Particles, Particles]:
         """The particles of the last frame that is done, moved to the frame before this one, and to it."""
@@ -251,18 +206,6 @@ class SmartCamera:
         for _ in range(self._done_frame + 1, index):
             previous = propagate(previous, self._motion, self._fusion_rng)
         return previous, propagate(previous, self._motion, self._fusion_rng)
-
-    def _is_new(self, image: UInt8[np.ndarray, "H W 3"]) -> bool:
-        """Whether a picture differs from the one before, as a sensor's noise alone makes it.
-
-        A camera that hangs gives the same picture again. It is no measurement independent of the last one, as
-        Eq. 12 takes for granted, and tells nothing new.
-        """
-        last, self._image = self._image, image
-        few = slice(None, None, 16)
-        if last is None or not np.array_equal(image[few, few], last[few, few]):
-            return True
-        return not np.array_equal(image, last)
 
     def _filter_locally(
         self, picture: Picture, predicted: Particles, appearance: Appearance | None
@@ -285,7 +228,7 @@ class SmartCamera:
         if frame.since != self._done_frame:
             previous, predicted = self._predict(frame.index)
         # sum: N times the average (Eq. 15-16)
-        lane = self._lane(frame.index)
+        lane = self._rounds.of(frame.index)
         fused = unpack(lane.value, len(lane.members), len(setup.start.mean), setup.fusion)
         self._indefinite["indefinite_fused"] += not fused.is_density
         # reweight, from the prior or the optimal proposal (Eq. 17)
@@ -323,12 +266,12 @@ class SmartCamera:
         self._appearance = self._model.first_appearance(picture, position)
         self._frames[0] = FrameInProgress(0, picture, 0, self._particles, self._particles)
         looks = pack_looks(self._appearance, self._setup.filter.color)
-        return self._with_result(self._lane(0).begin(0, looks))
+        return self._with_result(self._rounds.begin(0, looks))
 
     def _finish_first(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
         """A camera that saw nothing, or something else, takes the looks that the others saw."""
         color = self._setup.filter.color
-        self._appearance = settled(self._appearance, unpack_looks(self._lane(0).value, color), color)
+        self._appearance = settled(self._appearance, unpack_looks(self._rounds.of(0).value, color), color)
         visible = self._appearance is not None and self._appearance.own
         n = float(self._setup.filter.n_particles)
         message = self._message(frame, self._setup.start.moments, n, visible=visible)
@@ -352,6 +295,6 @@ class SmartCamera:
             visible=visible,
             lost=self._sighting.lost,
             ess=ess,
-            iterations=self._lane(frame.index).rounds_done,
-            members=self._lane(frame.index).members,
+            iterations=self._rounds.of(frame.index).rounds_done,
+            members=self._rounds.of(frame.index).members,
         )

@@ -29,7 +29,9 @@ PURE = (
             "camera.py",
             "central.py",
             "estimator.py",
+            "frame.py",
             "preview.py",
+            "rounds.py",
             "setup.py",
             "smart_camera.py",
         )
@@ -39,6 +41,7 @@ PURE = (
         for name in (
             *("live/nodes.py", "live/setting.py", "live/story.py", "replay/playback.py"),
             *("recording/foxglove.py", "recording/scene.py", "recording/schemas.py"),
+            *("faults/options.py", "faults/pictures.py", "faults/schedule.py"),
         )
     ),
     *(

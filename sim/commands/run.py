@@ -98,6 +98,10 @@ def run(
             results, dead = launch.run(), launch.dead
         summary = summarize(results, processes=1 if in_process else chosen.n_processes)
         summary["died"] = dead
+        if in_process:
+            # The launcher has heard them come and go; here, the cameras' word for it must do.
+            for event in summary["members"]["events"]:
+                recorder.event(**event)
         recorder.finish(summary)
     if as_json:
         sys.stdout.write(json.dumps(summary) + "\n")
@@ -164,8 +168,7 @@ def _print(summary: dict[str, Any], scenario: Scenario, folder: Path) -> None:
     if "frames_per_s" in timing:
         first, rate = timing["first_estimate_s"], timing["frames_per_s"]
         console.print(f"first estimate after {first:.1f} s, then {rate:.0f} frames/s")
-    if summary["died"]:
-        console.print(f"did not reach the end: {', '.join(summary['died'])}")
+    _print_members(console, summary)
     console.print(f"recorded in {folder}", soft_wrap=True)
 
 
@@ -177,6 +180,13 @@ def _trouble_lines(network: dict[str, Any]) -> Iterator[str]:
         yield f"messages of the rounds: {counted}"
     if network["lag_s"]:
         yield f"estimates come {network['lag_s']:g} s after their pictures"
+
+
+def _print_members(console: Console, summary: dict[str, Any]) -> None:
+    for event in summary["members"]["events"]:
+        console.print(f"{event['node']} {event['event']} in frame {event['frame']}")
+    if summary["died"]:
+        console.print(f"did not reach the end: {', '.join(summary['died'])}")
 
 
 def _array_text(cost: dict[str, float], words: int) -> str:

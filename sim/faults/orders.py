@@ -1,4 +1,4 @@
-"""What the launcher of a run orders on account of its faults, and whom it does not take for dead meanwhile."""
+"""What the launcher of a run orders on account of its faults, and whom it takes for dead no sooner."""
 
 import signal
 from collections.abc import Sequence

@@ -172,27 +172,34 @@ class Launch:
             ended.update(children.ended())
             if not self._heard.empty():
                 continue  # what they said before is heard first
-            for name in sorted(working & ended.keys()):
-                code, last_words = ended[name], children.last_words(name)
-                absence = self._orders.killed(name, code)
-                if absence is not None:
-                    self._recorder.event("killed", name, frame=self._frames_done)
-                    self._killed.add(name)
-                    del ended[name]
-                    if absence.end is None:
-                        self._recorder.forget(name)
-                        working.discard(name)
-                    continue
-                self._bury(name, "died", f"died (exit code {code}): {last_words}", exit_code=code)
-            if working and all(map(self._orders.excuses, working)):
-                for what, whom in self._orders.close():
-                    self._order(children, what, whom)
-                working.difference_update(self._killed)
+            working -= self._settle(children, working, ended)
             for name in sorted((working - ended.keys()) & self._silent()):
                 self._bury(name, "silent", "is heard of no more")
             for name in sorted((working - ended.keys() - self._silent()) & self._stuck(working)):
                 self._bury(name, "stuck", "is there but tells nothing")
             working.difference_update(self.dead)
+
+    def _settle(self, children: Children, working: set[str], ended: dict[str, int]) -> set[str]:
+        """What is to be said of those whose processes have ended; returns who will not come back."""
+        settled = set()
+        for name in sorted(working & ended.keys()):
+            absence = self._orders.killed(name, ended[name])
+            if absence is None:
+                code, last_words = ended[name], children.last_words(name)
+                self._bury(name, "died", f"died (exit code {code}): {last_words}", exit_code=code)
+                continue
+            self._recorder.event("killed", name, frame=self._frames_done)
+            self._killed.add(name)
+            del ended[name]
+            if absence.end is None:
+                self._recorder.forget(name)
+                settled.add(name)
+        # the others are done: nobody waits for the end of the faults any more
+        if all(map(self._orders.excuses, working - settled)):
+            for what, whom in self._orders.close():
+                self._order(children, what, whom)
+            settled |= self._killed
+        return settled
 
     def _stuck(self, working: set[str]) -> set[str]:
         """Nodes that are there but have told nothing since everybody was waited for: spinning, or hung."""

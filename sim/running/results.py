@@ -10,6 +10,7 @@ from jaxtyping import Float
 from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from sim.metrics.loss import losses
 from sim.metrics.sets import gospa, ospa
+from sim.running.members import disagreements, membership
 from sim.running.metrics import (
     LOST_DIAGONALS,
     LOST_ERROR,
@@ -120,6 +121,7 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
     scenario = results.scenario
     dcpf, single = results.of("dcpf"), results.of("single")
     cpf = next(iter(results.of("cpf").values()), None)
+    joint = {node: results.tracks[track] for node, track in dcpf.items()}
     errors = {track: results.errors(track) for track in results.tracks}
     per_node = {node: _rmse(errors[track]) for node, track in dcpf.items()}
     all_nodes = [e for track in dcpf.values() if (e := errors[track]) is not None]
@@ -132,6 +134,7 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
             "single": {node: _rmse(errors[track]) for node, track in single.items()},
             "dcpf_per_node": per_node,
         },
+        "disagreement_per_frame": disagreements(joint, scenario.frames, scenario.target.n_axes),
         "disagreement": _number(disagreement(np.array([results.means(t)[1:] for t in dcpf.values()])))
         if dcpf
         else None,
@@ -161,6 +164,7 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
             "cpf": _tracking(results, [cpf] if cpf else []),
         },
         "network": network_figures(scenario, results.first_statuses, results.statuses),
+        "members": membership(joint, [camera.name for camera in scenario.cameras], scenario.frames),
         "fusion": _fusion(results),
         **_array(results),
         "timing": {**results.timing, **_timing(results)},
