@@ -18,6 +18,8 @@ from network.messages import (
     EstimateMessage,
     PeerMessage,
     PixelsMessage,
+    PreviewMessage,
+    StateMessage,
     StatusMessage,
 )
 
@@ -127,7 +129,11 @@ class Transport(Protocol):
     def wait_for_control(self, timeout_s: float) -> ControlMessage | None:
         """The next order to this run, None when time is up; 0 only looks."""
 
-    def send(self, message: PeerMessage | EstimateMessage | StatusMessage) -> None:
+    @property
+    def watched(self) -> bool:
+        """Whether somebody looks at previews: they are sent only then."""
+
+    def send(self, message: PeerMessage | EstimateMessage | StatusMessage | PreviewMessage) -> None:
         """Sends a message of this node to whom it concerns."""
 
     def receive(self, sender: str, timeout_s: float) -> PeerMessage | None:
@@ -140,6 +146,12 @@ class Transport(Protocol):
         Returns:
             Its message, None when time is up or the sender is gone.
         """
+
+    def offer(self, state: StateMessage) -> None:
+        """Keeps what this node knows, for neighbours that ask."""
+
+    def ask(self, name: str, timeout_s: float) -> StateMessage | None:
+        """What another node knows, None where it does not answer in time or has nothing to tell."""
 
     def close(self) -> None:
         """Leaves the network, within seconds whatever the others do."""

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Iterable, Sequence
 from functools import partial
+from typing import Any
 
 import zenoh
 from zenoh import CongestionControl, Locality, Priority
@@ -24,6 +25,8 @@ from network.messages import (
     EstimateMessage,
     PeerMessage,
     PixelsMessage,
+    PreviewMessage,
+    StateMessage,
     StatusMessage,
     TruthMessage,
 )
@@ -35,6 +38,7 @@ _ENCODINGS = {
     kind: f"application/json;dcpf.{kind.kind}.v1"
     for kind in (EstimateMessage, StatusMessage, ControlMessage, TruthMessage)
 }
+_PREVIEW_ENCODING = "image/jpeg"
 _WATCH_PERIOD_S = 0.01
 _WATCH_CLOSELY_S = 0.002
 """The watchdog's period while somebody waits whose time is nearly up."""
@@ -83,11 +87,13 @@ class ZenohTransport:
         self._alive_changed = threading.Condition()
         self._orders: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._latest: dict[str, bytes] = {}
+        self._state: StateMessage | None = None
         self._wait: tuple[str, float] | None = None
         self._closed = threading.Event()
         self._session = sessions.open_peer(listen, connect)
         self._inboxes = {sender: self._declare_inbox(sender) for sender in self._heard}
         self._declare_orders()
+        self._watched = threading.Event()
         self._publishers = self._declare_publishers(drop_late_pixels=drop_late_pixels)
         self._declare_liveliness()
         threading.Thread(target=self._watch, name="watchdog", daemon=True).start()
@@ -120,7 +126,12 @@ class ZenohTransport:
             except RefusedMessage as refusal:
                 self.counters.refuse("control", refusal.reason)
 
-    def send(self, message: PeerMessage | EstimateMessage | StatusMessage) -> None:
+    @property
+    def watched(self) -> bool:
+        """Whether somebody looks at previews: they are sent only then."""
+        return self._watched.is_set()
+
+    def send(self, message: PeerMessage | EstimateMessage | StatusMessage | PreviewMessage) -> None:
         """Sends a message of this node to whom it concerns."""
         data = codec.encode(self._run, message)
         if isinstance(message, PeerMessage):
@@ -163,6 +174,24 @@ class ZenohTransport:
         finally:
             self._wait = None
 
+    def offer(self, state: StateMessage) -> None:
+        """Keeps what this node knows, for neighbours that ask."""
+        self._state = state
+
+    def ask(self, name: str, timeout_s: float) -> StateMessage | None:
+        """What another node knows, None where it does not answer in time or has nothing to tell."""
+        for reply in self._session.get(keys.state(self._run, name), timeout=timeout_s):
+            if reply.ok is None:
+                continue
+            try:
+                state = codec.decode_public(StateMessage, reply.ok.payload.to_bytes())
+            except RefusedMessage as refusal:
+                self.counters.refuse(name, refusal.reason)
+                continue
+            if state.node == name:
+                return state
+        return None
+
     def close(self) -> None:
         """Leaves the network, within seconds whatever the others do."""
         self._closed.set()
@@ -177,6 +206,8 @@ class ZenohTransport:
         self._session.declare_subscriber(keys.control(self._run), zenoh.handlers.Callback(self._on_order))
         for key in (keys.status(self._run, self._name), keys.estimate(self._run, self._name)):
             self._session.declare_queryable(key, zenoh.handlers.Callback(partial(self._answer, key)))
+        state_key = keys.state(self._run, self._name)
+        self._session.declare_queryable(state_key, zenoh.handlers.Callback(self._answer_state))
 
     def _on_order(self, sample: zenoh.Sample) -> None:
         self._orders.put(sample.payload.to_bytes())
@@ -187,6 +218,12 @@ class ZenohTransport:
             if key in self._latest:
                 query.reply(key, self._latest[key])
 
+    def _answer_state(self, query: zenoh.Query) -> None:
+        # Put into bytes here, since hardly anybody ever asks.
+        with query:
+            if self._state is not None:
+                query.reply(keys.state(self._run, self._name), codec.encode_public(self._state))
+
     def _declare_publishers(self, *, drop_late_pixels: bool) -> dict[type, zenoh.Publisher]:
         run, name = self._run, self._name
         publish = partial(self._session.declare_publisher, allowed_destination=Locality.REMOTE)
@@ -195,6 +232,14 @@ class ZenohTransport:
         )
         public = partial(publish, congestion_control=CongestionControl.BLOCK)
         pixels_control = CongestionControl.DROP if drop_late_pixels else CongestionControl.BLOCK
+        # Whoever looks too slowly misses pictures and holds nobody up.
+        preview = publish(
+            keys.preview(run, name),
+            encoding=_PREVIEW_ENCODING,
+            congestion_control=CongestionControl.DROP,
+            priority=Priority.DATA_LOW,
+        )
+        preview.declare_matching_listener(zenoh.handlers.Callback(self._on_watched))
         return {
             ConsensusMessage: rounds(keys.consensus(run, name)),
             ConfirmMessage: rounds(keys.confirm(run, name)),
@@ -203,7 +248,14 @@ class ZenohTransport:
             ),
             EstimateMessage: public(keys.estimate(run, name), encoding=_ENCODINGS[EstimateMessage]),
             StatusMessage: public(keys.status(run, name), encoding=_ENCODINGS[StatusMessage]),
+            PreviewMessage: preview,
         }
+
+    def _on_watched(self, status: zenoh.MatchingStatus) -> None:
+        if status.matching:
+            self._watched.set()
+        else:
+            self._watched.clear()
 
     def _declare_liveliness(self) -> None:
         self._session.liveliness().declare_subscriber(
@@ -245,6 +297,25 @@ class ZenohTransport:
                 self._session.put(
                     self._inbox_keys[sender], _WAKE_UP, allowed_destination=Locality.SESSION_LOCAL
                 )
+
+
+def has_listeners(publisher: zenoh.Publisher) -> bool:
+    """Whether anybody subscribes to what a publisher publishes."""
+    status: Any = publisher.matching_status  # not a bool, whatever Zenoh's types say: always true as one
+    return bool(status.matching)
+
+
+def publish_again(session: zenoh.Session, key: str, data: bytes) -> None:
+    """Publishes what was told in a run, byte for byte, from outside the nodes."""
+    _, _, kind = key.rpartition("/")
+    picture = kind == PreviewMessage.kind
+    session.put(
+        key,
+        data,
+        encoding=_PREVIEW_ENCODING if picture else f"application/json;dcpf.{kind}.v1",
+        congestion_control=CongestionControl.DROP if picture else CongestionControl.BLOCK,
+        priority=Priority.DATA_LOW if picture else Priority.DATA,
+    )
 
 
 def publish(session: zenoh.Session, run: str, message: ControlMessage | TruthMessage) -> None:

@@ -8,6 +8,9 @@ import time
 from collections.abc import Iterable
 from threading import Event
 
+import numpy as np
+from jaxtyping import UInt8
+
 from network.messages import (
     ConfirmMessage,
     ConsensusMessage,
@@ -18,12 +21,15 @@ from network.messages import (
 from network.transport import Links, Transport
 from nodes.central import Central
 from nodes.pace import Pace
+from nodes.returning import LEAD, Returning
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
 from nodes.telemetry import Counters, State, Telemetry
 
 AHEAD = 2
 """Frames that a camera may be ahead of the last one that the sink of its pictures has confirmed."""
+REPORT_PERIOD_S = 1.0
+"""How often a node tells how it is, while somebody looks."""
 PATIENCE_S = 0.25
 """How long a wait lasts at most before the shell looks whether it has been told to stop."""
 TURN_S = 0.005
@@ -47,6 +53,7 @@ class Shell:
         self.telemetry = Telemetry()
         self._stopped = stopped
         self._start_s = 0.0
+        self._reported_s = 0.0
 
     def wait_for_start(self, linked: Iterable[str]) -> bool:
         """Announces the node and waits for the start; False if it is told to leave instead.
@@ -57,10 +64,14 @@ class Shell:
         self.transport.announce()
         while not self.stopped:
             missing = self.transport.wait_until_alive(linked, PATIENCE_S)
-            if not missing:
+            # Where a run is under way, those that are missing may be so for good.
+            ready = not missing or any(
+                self.transport.ask(name, PATIENCE_S) for name in linked if name not in missing
+            )
+            if ready:
                 # Said again until the start, for a launcher that comes later.
                 self.report("ready", -1, {})
-            order = self.transport.wait_for_control(0 if missing else PATIENCE_S)
+            order = self.transport.wait_for_control(PATIENCE_S if ready else 0)
             if order is not None:
                 return self._obey(order)
         return False
@@ -108,6 +119,18 @@ class Shell:
         """When a frame that begins now is taken to have begun, on the monotonic clock."""
         return time.monotonic() + self.begins_in_s(index)
 
+    def show(self, node: SmartCamera, index: int, image: UInt8[np.ndarray, "H W 3"]) -> None:
+        """Shows a frame that is done to those who look, if anybody does."""
+        if self.transport.watched:
+            self.transport.send(node.preview(index, image))
+            self.report_now_and_then(index, node.counters)
+
+    def report_now_and_then(self, index: int, counters: Counters) -> None:
+        """Tells those who look how the node is, once a second."""
+        if self.transport.watched and time.monotonic() - self._reported_s >= REPORT_PERIOD_S:
+            self._reported_s = time.monotonic()
+            self.report("running", index, counters)
+
     def report(self, state: State, frame: int, counters: Counters) -> None:
         """Tells everybody how the node is."""
         self.transport.send(self.telemetry.status(self.name, state, frame, self.transport.counters, counters))
@@ -127,10 +150,18 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         return
     confirmed, done = -1.0, -1
     begun: dict[int, float] = {}
-    for index in range(shell.frames):
-        if not shell.await_frame(index):
+    returning = Returning(shell.transport, links.neighbors, shell.pace)
+    index, state = 0, returning.newest()
+    while index < shell.frames:
+        # who was away goes on ahead of the others
+        if state is not None:
+            index = max(index, state.frame + LEAD)
+        if index >= shell.frames or not shell.await_frame(index):
+            index += 1
             continue
         image = source.read(index) if index else first
+        if state is not None:
+            node.on_return(image, state)
         # pixels to the central node, which confirms them in lockstep
         if links.sinks:
             if shell.pace.kind == "lockstep":
@@ -145,9 +176,13 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         begun[index] = shell.began(index)
         begun = {each: begun[each] for each in node.open_rounds}
         _rounds(node, begun, shell, frame=index + 1)
-        done = done if shell.stopped else index
-        if index == 0:
+        shell.transport.offer(node.state)
+        if done < 0 and not shell.stopped:
             shell.report("running", index, node.counters)
+        done = done if shell.stopped else index
+        shell.show(node, index, image)
+        index += 1
+        state = returning.missed(node, index)
     _rounds(node, begun, shell)
     source.close()
     shell.report("failed" if shell.stopped else "done", done, node.counters)
@@ -213,13 +248,15 @@ def _await_confirmation(sink: str, frame: int, confirmed: float, shell: Shell) -
     return confirmed
 
 
-def run_central(node: Central, shell: Shell) -> None:
+def run_central(node: Central, links: Links, shell: Shell) -> None:
     """The life of the central node."""
     if not shell.wait_for_start(node.cameras):
         return
     while node.frame < shell.frames and node.cameras and not shell.stopped:
         index = node.frame
         shell.await_frame(index)
+        # cameras that were gone and send again
+        _read(node, set(links.cameras) - node.cameras, shell)
         deadline = shell.began(index) + shell.pace.budget_s
         while node.frame == index and node.cameras and not shell.stopped:
             camera = node.waiting_for[0]
@@ -235,9 +272,22 @@ def run_central(node: Central, shell: Shell) -> None:
                 deadline = shell.began(index) + shell.pace.budget_s
             elif left <= 0:
                 shell.telemetry.late += 1
-                _send(node.on_deadline(), shell)
+                # those behind the one that was waited for
+                _read(node, node.waiting_for, shell)
+                if node.frame == index:
+                    _send(node.on_deadline(), shell)
+        shell.report_now_and_then(node.frame - 1, {})
     shell.report("done" if node.frame == shell.frames else "failed", node.frame - 1, {})
     shell.wait_for_stop()
+
+
+def _read(node: Central, cameras: Iterable[str], shell: Shell) -> None:
+    """Takes what has come from cameras, without waiting."""
+    for camera in sorted(cameras):
+        if shell.transport.alive(camera):
+            message = shell.transport.receive(camera, 0)
+            if isinstance(message, PixelsMessage):
+                _send(node.on_message(message), shell)
 
 
 def _send(messages: Iterable[ConsensusMessage | EstimateMessage | ConfirmMessage], shell: Shell) -> None:

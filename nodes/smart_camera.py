@@ -6,13 +6,12 @@ a camera lives in this file, in the order in which it happens (Jing & Chen, sect
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
 from network.consensus import Consensus
-from network.messages import ConsensusMessage, EstimateMessage
+from network.messages import ConsensusMessage, EstimateMessage, PreviewMessage, StateMessage
 from nodes.array_estimator import ArrayEstimator
 from nodes.estimator import SirEstimator
 from nodes.filtering.appearance import Appearance, pack_looks, settled, unpack_looks
@@ -22,33 +21,14 @@ from nodes.filtering.local import LocalResult, local_filter
 from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.particles import Particles, effective_sample_size, resample_if_degenerate
 from nodes.filtering.sighting import Sighting, shrinkage_by
+from nodes.frame import FrameInProgress, is_new
+from nodes.preview import preview
+from nodes.rounds import Rounds
 from nodes.setup import TrackingSetup
 from nodes.simd.report import FrameReport
 from nodes.telemetry import Counters
 
-SILENT_ROUNDS = 12
-"""Rounds in a row without a word of a neighbour after which it is gone; 0.3 to this power is 5e-7."""
-
 Outgoing = tuple[ConsensusMessage | EstimateMessage, ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FrameInProgress:
-    """What a camera keeps of a frame while its neighbours' messages come in.
-
-    Attributes:
-        index: The frame.
-        picture: Its picture.
-        since: The last frame that was done when it began.
-        previous: The particles of the frame before, as far as they were known then.
-        predicted: The same, propagated.
-    """
-
-    index: int
-    picture: Picture
-    since: int
-    previous: Particles
-    predicted: Particles
 
 
 class SmartCamera:
@@ -63,7 +43,6 @@ class SmartCamera:
         model: ObservationModel,
         setup: TrackingSetup,
         lanes: Sequence[Consensus],
-        cameras: tuple[str, ...],
         single: SirEstimator | ArrayEstimator | None = None,
     ) -> None:
         """A camera before its first frame.
@@ -71,13 +50,13 @@ class SmartCamera:
         Args:
             model: The camera's observation model.
             setup: What the run tracks.
-            lanes: Its part of the averaging: one, or so many that as many frames' rounds may overlap.
-            cameras: The cameras of the network.
+            lanes: Its part of the averaging, which knows who takes part: one, or so many that as many frames'
+                rounds may overlap.
             single: The camera's own filter beside, as a baseline.
         """
         self.name = model.camera.name
         self._indefinite: Counter[str] = Counter(indefinite_local=0, indefinite_fused=0)
-        self._model, self._setup, self._lanes, self._cameras = model, setup, tuple(lanes), set(cameras)
+        self._model, self._setup, self._rounds = model, setup, Rounds(lanes)
         self._motion = setup.motion
         self._fusion_rng = setup.stream(self.name, "fusion")
         self._local_rng = setup.stream(self.name, "local")
@@ -85,8 +64,9 @@ class SmartCamera:
         self._local_particles = setup.first_particles(self._local_rng)
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
+        self._image: UInt8[np.ndarray, "H W 3"] | None = None
+        self._estimate = setup.start.moments
         self._frames: dict[int, FrameInProgress] = {}
-        self._silent: Counter[str] = Counter()
         self._last_frame = 0
         self._done_frame = 0
         self._single = single
@@ -108,66 +88,99 @@ class SmartCamera:
         # predict: χ(k) ~ P(χ(k) | χ(k-1))
         previous, predicted = self._predict(index)
         # reweight by the own picture: u, p, v, r
-        local = self._filter_locally(picture, predicted)
+        fresh = is_new(image, self._image)
+        self._image = image
+        local = self._filter_locally(picture, predicted, self._appearance if fresh else None)
         self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
-        self._frames[index] = FrameInProgress(index, picture, self._done_frame, previous, predicted)
-        return self._with_result(self._lane(index).begin(index, pack(local, self._setup.fusion)))
+        self._frames[index] = FrameInProgress(index, picture, self._done_frame, previous, predicted, fresh)
+        return self._with_result(self._rounds.begin(index, pack(local, self._setup.fusion)))
 
     def on_message(self, message: ConsensusMessage) -> Outgoing:
-        """A neighbour's value of a round has come."""
-        self._silent.pop(message.sender, None)
-        return self._with_result(self._lane(message.frame).receive(message))
+        """A neighbour's value of a round has come; one that was gone is counted on again."""
+        return self._with_result(self._rounds.receive(message))
+
+    def on_return(self, image: UInt8[np.ndarray, "H W 3"], state: StateMessage) -> None:
+        """The camera was away: it goes on with what a neighbour knows.
+
+        Args:
+            image: What it sees now; the gain is measured against it where nothing was seen before.
+            state: The neighbour's state, of a frame before the next one.
+        """
+        setup = self._setup
+        if len(state.mean) != len(setup.start.mean):
+            return
+        known = Moments(state.mean, state.covariance)
+        self._particles = setup.particles(known, self._fusion_rng)
+        self._local_particles = setup.particles(known, self._local_rng)
+        self._rounds.cut()
+        self._frames.clear()
+        self._last_frame = self._done_frame = state.frame
+        self._sighting = Sighting()
+        if self._appearance is None:
+            self._model = self._model.with_first(image)
+            self._appearance = unpack_looks(state.looks, setup.filter.color)
+            # its own filter, the baseline, has nobody to ask
+            self._single = None
 
     def on_lost(self, neighbor: str) -> Outgoing:
         """A neighbour is gone: the rounds go on without it."""
-        self._silent.pop(neighbor, None)
-        self._cameras.discard(neighbor)
-        return self._with_result(sum((lane.drop(neighbor) for lane in self._lanes), ()))
+        return self._with_result(self._rounds.lose(neighbor))
 
     def on_round_deadline(self, frame: int) -> Outgoing:
-        """The time of a frame's round is up: it is done without those that are late.
-
-        Who has said nothing for a whole dozen of rounds is taken to be gone.
-        """
-        self._silent.update(self.waiting_for(frame))
-        outgoing = self._with_result(self._lane(frame).expire())
-        for name in sorted(name for name, rounds in self._silent.items() if rounds >= SILENT_ROUNDS):
-            outgoing += self.on_lost(name)
-        return outgoing
+        """The time of a frame's round is up: it is done without those that are late."""
+        return self._with_result(self._rounds.expire(frame))
 
     def on_deadline(self, frame: int) -> Outgoing:
         """A frame's time is up: what the rounds have reached must do."""
-        self._lane(frame).cut()
+        self._rounds.of(frame).cut()
         return self._with_result(())
+
+    def preview(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> PreviewMessage:
+        """What a frame that is done looks like, for people."""
+        run, time_s = self._setup.run, index / self._setup.rate_hz
+        return preview(run, self.name, index, time_s, image, self._particles)
 
     @property
     def open_rounds(self) -> Mapping[int, int]:
         """Frames whose rounds are not over, from the oldest on, and the round, from 1, that each is in."""
-        return {frame: lane.rounds_done + 1 for frame in self._frames if not (lane := self._lane(frame)).done}
+        return {
+            frame: lane.rounds_done + 1 for frame in self._frames if not (lane := self._rounds.of(frame)).done
+        }
 
     def waiting_for(self, frame: int) -> tuple[str, ...]:
         """Neighbours without whose message a frame cannot go on; none when it is done."""
-        return self._lane(frame).waiting_for() if frame in self._frames else ()
+        return self._rounds.of(frame).waiting_for() if frame in self._frames else ()
+
+    @property
+    def heard(self) -> Mapping[str, int]:
+        """The latest frame in which each neighbour has spoken, -1 for one that never has."""
+        return self._rounds.heard
+
+    @property
+    def state(self) -> StateMessage:
+        """What a neighbour that was away needs to know."""
+        looks = pack_looks(self._appearance, self._setup.filter.color)
+        mean, covariance = self._estimate.mean, self._estimate.covariance
+        return StateMessage(self.name, self._done_frame, mean, covariance, looks)
 
     @property
     def rounds_done(self) -> int:
         """Rounds of consensus done since the first frame."""
-        return sum(lane.rounds_in_all for lane in self._lanes)
+        return self._rounds.done
 
     @property
     def counters(self) -> Counters:
         """What it has counted.
 
         Frames in which the local (`indefinite_local`) or the fused (`indefinite_fused`) difference of
-        information matrices was not positive semidefinite, so that Eq. 17 had no density; and messages
-        of the rounds that were of no use, by reason (`unused`); the cost of a frame on the emulated array
-        (`simd`), if there is one.
+        information matrices was not positive semidefinite, so that Eq. 17 had no density; messages of the
+        rounds that were of no use, by reason (`unused`); what a frame costs on the emulated array (`simd`).
         """
         report = self._array_report
         return {
             **self._indefinite,
-            "unused": dict(sum((lane.counters for lane in self._lanes), Counter[str]())),
+            "unused": self._rounds.counters,
             **({"simd": report.figures} if report else {}),
         }
 
@@ -181,15 +194,11 @@ class SmartCamera:
     def _with_result(self, messages: tuple[ConsensusMessage, ...]) -> Outgoing:
         """The messages of the rounds, and the estimates of the frames whose rounds are over."""
         outgoing: Outgoing = messages
-        while self._frames and self._lane(index := min(self._frames)).done:
+        while self._frames and self._rounds.of(index := min(self._frames)).done:
             frame = self._frames.pop(index)
             outgoing += self._finish(frame) if index else self._finish_first(frame)
             self._done_frame = index
         return outgoing
-
-    def _lane(self, frame: int) -> Consensus:
-        """The averaging of a frame."""
-        return self._lanes[frame % len(self._lanes)]
 
     def _predict(self, index: int) -> tuple[Particles, Particles]:
         """The particles of the last frame that is done, moved to the frame before this one, and to it."""
@@ -198,12 +207,14 @@ class SmartCamera:
             previous = propagate(previous, self._motion, self._fusion_rng)
         return previous, propagate(previous, self._motion, self._fusion_rng)
 
-    def _filter_locally(self, picture: Picture, predicted: Particles) -> LocalResult:
+    def _filter_locally(
+        self, picture: Picture, predicted: Particles, appearance: Appearance | None
+    ) -> LocalResult:
         """Eq. 9-14 on the fusion filter's particles, or on the local filter's own."""
         own = self._setup.fusion.local_particles == "own"
         if own:
             predicted = propagate(self._local_particles, self._motion, self._local_rng)
-        log_likelihoods = self._model.log_likelihoods(picture, predicted.positions, self._appearance)
+        log_likelihoods = self._model.log_likelihoods(picture, predicted.positions, appearance)
         result = local_filter(predicted, log_likelihoods)
         if own:
             threshold = self._setup.filter.resampling.threshold
@@ -217,12 +228,14 @@ class SmartCamera:
         if frame.since != self._done_frame:
             previous, predicted = self._predict(frame.index)
         # sum: N times the average (Eq. 15-16)
-        fused = unpack(self._lane(frame.index).value, len(self._cameras), len(setup.start.mean), setup.fusion)
+        lane = self._rounds.of(frame.index)
+        fused = unpack(lane.value, len(lane.members), len(setup.start.mean), setup.fusion)
         self._indefinite["indefinite_fused"] += not fused.is_density
         # reweight, from the prior or the optimal proposal (Eq. 17)
         posterior = fuse(previous, predicted, fused, self._motion, setup.fusion, self._fusion_rng)
         # estimate
         estimate = moments(posterior.states, posterior.weights)
+        self._estimate = estimate
         ess = effective_sample_size(posterior)
         prior = moments(predicted.states, predicted.weights)
         self._sighting = self._sighting.after(shrinkage_by(fused.gain, prior))
@@ -230,7 +243,7 @@ class SmartCamera:
         threshold = setup.filter.resampling.threshold
         self._particles = resample_if_degenerate(posterior, threshold, self._fusion_rng)
         # update the reference (Eq. 4)
-        visible = self._update_appearance(frame.picture, estimate.position().mean)
+        visible = frame.fresh and self._update_appearance(frame.picture, estimate.position().mean)
         message = self._message(frame, estimate, ess, visible=visible)
         if self._single is None:
             return (message,)
@@ -253,12 +266,12 @@ class SmartCamera:
         self._appearance = self._model.first_appearance(picture, position)
         self._frames[0] = FrameInProgress(0, picture, 0, self._particles, self._particles)
         looks = pack_looks(self._appearance, self._setup.filter.color)
-        return self._with_result(self._lane(0).begin(0, looks))
+        return self._with_result(self._rounds.begin(0, looks))
 
     def _finish_first(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
         """A camera that saw nothing, or something else, takes the looks that the others saw."""
         color = self._setup.filter.color
-        self._appearance = settled(self._appearance, unpack_looks(self._lane(0).value, color), color)
+        self._appearance = settled(self._appearance, unpack_looks(self._rounds.of(0).value, color), color)
         visible = self._appearance is not None and self._appearance.own
         n = float(self._setup.filter.n_particles)
         message = self._message(frame, self._setup.start.moments, n, visible=visible)
@@ -282,6 +295,6 @@ class SmartCamera:
             visible=visible,
             lost=self._sighting.lost,
             ess=ess,
-            iterations=self._lane(frame.index).rounds_done,
-            members=tuple(sorted(self._cameras)),
+            iterations=self._rounds.of(frame.index).rounds_done,
+            members=self._rounds.of(frame.index).members,
         )

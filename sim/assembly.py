@@ -11,6 +11,7 @@ from jaxtyping import Float, UInt8
 from network.averaging.algorithm import Algorithm
 from network.consensus import Consensus
 from network.graph import Graph
+from network.membership import Membership
 from network.messages import TruthMessage, Visibility
 from network.streams import stream
 from network.transport import Links, links_of
@@ -24,6 +25,7 @@ from nodes.setup import Start, TrackingSetup
 from nodes.simd.likelihood import SimdLikelihood
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
+from sim.faults.pictures import with_faults
 from sim.scenario.loading import cameras_of, video_source
 from sim.scenario.model import Scenario
 from sim.scenario.parsing import ScenarioError
@@ -216,10 +218,16 @@ class Assembly:
             self.model_on_camera(name),
             self.setup,
             [
-                Consensus(name, neighbors, self.algorithm, network.iterations, quantizer)
+                Consensus(
+                    name,
+                    neighbors,
+                    self.algorithm,
+                    network.iterations,
+                    quantizer,
+                    Membership(name, self.graph, network.iterations),
+                )
                 for _ in range(1 + self.scenario.lag_frames)
             ],
-            self.graph.names,
             self.single(name),
         )
 
@@ -234,9 +242,19 @@ class Assembly:
         Raises:
             SourceError: Its video cannot be read.
         """
-        if self.world is not None:
-            return RenderedSource(self.world, self.cameras[camera], self.scenario.rate_hz)
-        return video_source(self.scenario, camera)
+        if self.world is None:
+            source: FrameSource = video_source(self.scenario, camera)
+        else:
+            source = self._render(self.cameras[camera])
+        return with_faults(source, self.cameras[camera], self.scenario.faults, self._render)
+
+    def _render(self, camera: Camera) -> RenderedSource:
+        if self.world is None:
+            raise ValueError(f"{self.scenario.name} has no rendered world")
+        try:
+            return RenderedSource(self.world, camera, self.scenario.rate_hz)
+        except ValueError as error:
+            raise ScenarioError(f"{self.scenario.name}: {error}") from error
 
     def truth_message(self, frame: int, *, with_visibility: bool = True) -> TruthMessage | None:
         """The truth of a frame, or None where nobody knows it.

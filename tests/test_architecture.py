@@ -17,16 +17,42 @@ OUTSIDE_WORLD = {
 
 PURE = (
     *sorted((ROOT / "nodes/filtering").glob("*.py")),
+    *sorted(path for path in (ROOT / "nodes/counting").glob("*.py") if path.name != "build.py"),
+    *sorted((ROOT / "sim/metrics").glob("*.py")),
+    ROOT / "sim/running/metrics.py",
     *sorted((ROOT / "network/averaging").glob("*.py")),
+    *sorted((ROOT / "nodes/simd").rglob("*.py")),
     *(
         ROOT / "nodes" / name
-        for name in ("camera.py", "central.py", "estimator.py", "pace.py", "setup.py", "smart_camera.py")
+        for name in (
+            "array_estimator.py",
+            "camera.py",
+            "central.py",
+            "estimator.py",
+            "frame.py",
+            "pace.py",
+            "preview.py",
+            "rounds.py",
+            "setup.py",
+            "smart_camera.py",
+        )
+    ),
+    *(
+        ROOT / "sim" / name
+        for name in (
+            *("live/nodes.py", "live/setting.py", "live/story.py", "replay/playback.py"),
+            *("recording/foxglove.py", "recording/scene.py", "recording/schemas.py"),
+            *("faults/options.py", "faults/pictures.py", "faults/schedule.py"),
+        )
     ),
     *(
         ROOT / "network" / name
         for name in (
-            *("codec.py", "conditions.py", "consensus.py", "errors.py", "graph.py", "keys.py", "memory.py"),
+            *("codec.py", "conditions.py", "consensus.py", "errors.py", "graph.py", "header.py"),
+            *("jpeg.py", "keys.py"),
             *(
+                "membership.py",
+                "memory.py",
                 "messages.py",
                 "options.py",
                 "quantization.py",

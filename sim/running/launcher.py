@@ -12,9 +12,10 @@ import zenoh
 
 from network import codec, keys, sessions
 from network.errors import RefusedMessage
-from network.messages import ControlMessage, EstimateMessage, StatusMessage, TruthMessage
+from network.messages import ControlMessage, EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from network.zenoh import publish
 from sim.assembly import Assembly
+from sim.faults.orders import Orders
 from sim.running.children import Children, RunFailed
 from sim.running.endpoints import run_endpoints
 from sim.running.recorder import Recorder, expected_tracks
@@ -29,6 +30,8 @@ STUCK_DEADLINES = 4
 LEAD_S = 0.2
 """In real time, frame 0 begins this long after the order to start."""
 
+Heard = EstimateMessage | StatusMessage | PreviewMessage
+"""What nodes tell."""
 Progress = Callable[[int], None]
 """Told the number of frames that are done."""
 
@@ -43,6 +46,8 @@ class Launch:
         progress: Progress,
         by_hand: Sequence[str],
         began: float,
+        *,
+        audience: Callable[[], None] | None = None,
     ) -> None:
         """A run that has not begun.
 
@@ -52,8 +57,11 @@ class Launch:
             progress: Told how far it is.
             by_hand: Nodes that somebody else starts.
             began: When the user's command began, on the monotonic clock.
+            audience: Waits for those who look on, if there are any; the frames start when it is back.
         """
         self._began = began
+        self._audience = audience
+        self._watched = audience is not None or recorder.filming
         self.results = Results(assembly.scenario)
         self.dead: list[str] = []
         self._assembly, self._recorder, self._progress, self._by_hand = assembly, recorder, progress, by_hand
@@ -64,6 +72,9 @@ class Launch:
         self._refused: set[tuple[str, str]] = set()
         self._truth_next = 0
         self._frames_done = 0
+        self._orders = Orders(assembly.scenario.faults)
+        self._killed: set[str] = set()  # by the scenario's faults, and not started again
+        self._start_order = ControlMessage("start")
 
     def run(self) -> Results:
         """Runs it all.
@@ -85,16 +96,23 @@ class Launch:
             children = stack.enter_context(
                 Children(recorded / "scenario.yaml", recorded / "logs", folder, self._by_hand)
             )
-            session = sessions.open_client(run_endpoints(self._assembly.scenario, folder, []).router)
+            router = run_endpoints(self._assembly.scenario, folder, []).router
+            session = sessions.open_client(router, timeout_s=None)
             stack.callback(sessions.close, session)
             # However it ends, nodes that somebody else has started shall know.
             stack.callback(publish, session, self._assembly.scenario.name, ControlMessage("stop"))
             self._listen(session)
             self._wait_until_ready(children)
+            if self._audience is not None:
+                waiting = time.monotonic()
+                self._audience()
+                self._began += time.monotonic() - waiting  # whose time it is not
             self._start(session)
             started = self._last_heard = time.monotonic()
             for message in self._messages(children):
                 self._take(message, session)
+                for what, whom in self._orders.due(self._frames_done):
+                    self._order(children, what, whom)
                 first = isinstance(message, EstimateMessage) and message.frame == 1
                 if first and "first_estimate_s" not in self.results.timing:
                     self.results.timing["first_estimate_s"] = round(time.monotonic() - self._began, 3)
@@ -108,6 +126,8 @@ class Launch:
         hear = zenoh.handlers.Callback(self._heard.put, indirect=False)
         session.declare_subscriber(keys.estimate(run), hear)
         session.declare_subscriber(keys.status(run), hear)
+        if self._recorder.filming:
+            session.declare_subscriber(keys.preview(run), hear)
         session.liveliness().declare_subscriber(keys.alive(run), hear, history=True)
 
     def _wait_until_ready(self, children: Children) -> None:
@@ -129,9 +149,17 @@ class Launch:
     def _start(self, session: zenoh.Session) -> None:
         realtime = self._assembly.scenario.pace == "realtime"
         start_time_s = time.time() + LEAD_S if realtime else None
-        publish(session, self._assembly.scenario.name, ControlMessage("start", start_time_s))
+        self._start_order = ControlMessage("start", start_time_s)
+        publish(session, self._assembly.scenario.name, self._start_order)
 
-    def _messages(self, children: Children) -> Iterator[EstimateMessage | StatusMessage | None]:
+    def _order(self, children: Children, what: str, whom: str) -> None:
+        """Orders what the scenario's faults ask for."""
+        self._recorder.event(what, whom, frame=self._frames_done)
+        self._absent_since.pop(whom, None)
+        self._killed.discard(whom)
+        children.do(what, whom)
+
+    def _messages(self, children: Children) -> Iterator[Heard | None]:
         """What the nodes tell, until all have told their last, have died, or are heard of no more."""
         working, ended = set(self._nodes), dict[str, int]()
         while working:
@@ -144,14 +172,34 @@ class Launch:
             ended.update(children.ended())
             if not self._heard.empty():
                 continue  # what they said before is heard first
-            for name in sorted(working & ended.keys()):
-                code, last_words = ended[name], children.last_words(name)
-                self._bury(name, "died", f"died (exit code {code}): {last_words}", exit_code=code)
+            working -= self._settle(children, working, ended)
             for name in sorted((working - ended.keys()) & self._silent()):
                 self._bury(name, "silent", "is heard of no more")
             for name in sorted((working - ended.keys() - self._silent()) & self._stuck(working)):
                 self._bury(name, "stuck", "is there but tells nothing")
             working.difference_update(self.dead)
+
+    def _settle(self, children: Children, working: set[str], ended: dict[str, int]) -> set[str]:
+        """What is to be said of those whose processes have ended; returns who will not come back."""
+        settled = set()
+        for name in sorted(working & ended.keys()):
+            absence = self._orders.killed(name, ended[name])
+            if absence is None:
+                code, last_words = ended[name], children.last_words(name)
+                self._bury(name, "died", f"died (exit code {code}): {last_words}", exit_code=code)
+                continue
+            self._recorder.event("killed", name, frame=self._frames_done)
+            self._killed.add(name)
+            del ended[name]
+            if absence.end is None:
+                self._recorder.forget(name)
+                settled.add(name)
+        # the others are done: nobody waits for the end of the faults any more
+        if all(map(self._orders.excuses, working - settled)):
+            for what, whom in self._orders.close():
+                self._order(children, what, whom)
+            settled |= self._killed
+        return settled
 
     def _stuck(self, working: set[str]) -> set[str]:
         """Nodes that are there but have told nothing since everybody was waited for: spinning, or hung."""
@@ -161,7 +209,8 @@ class Launch:
     def _silent(self) -> set[str]:
         """Nodes that have been away for longer than anybody waits for them: stopped, or dead elsewhere."""
         limit = time.monotonic() - self._assembly.scenario.network.deadline_s
-        return {name for name, since in self._absent_since.items() if since < limit}
+        away = {name for name, since in self._absent_since.items() if since < limit}
+        return {name for name in away if not self._orders.excuses(name)}
 
     def _bury(self, name: str, event: str, what: str, **details: int) -> None:
         self.dead.append(name)
@@ -169,7 +218,7 @@ class Launch:
         self._recorder.forget(name)
         _log.error("node %s %s; the others go on", name, what)
 
-    def _next(self) -> EstimateMessage | StatusMessage | None:
+    def _next(self) -> Heard | None:
         """The next valid message, None if there is none for a while."""
         try:
             sample = self._heard.get(timeout=IDLE_S)
@@ -199,16 +248,21 @@ class Launch:
             self._absent_since[node] = time.monotonic()
         self._recorder.event("seen" if here else "lost", node, frame=self._frames_done)
 
-    def _take(self, message: EstimateMessage | StatusMessage | None, session: zenoh.Session) -> None:
+    def _take(self, message: Heard | None, session: zenoh.Session) -> None:
         if message is None:
             if self._assembly.scenario.pace == "realtime":
                 self._tell_truth(session, min(self._truth_next + 1, self._frames_done))
             return
         self.results.add(message)
         self._recorder.add(message)
+        if isinstance(message, StatusMessage) and message.state == "ready":
+            # it comes when the others have begun
+            publish(session, self._assembly.scenario.name, self._start_order)
         if isinstance(message, EstimateMessage) and message.frame >= self._frames_done:
             self._frames_done = message.frame + 1
             self._progress(self._frames_done)
+            if self._watched:
+                self._tell_truth(session, self._frames_done)
 
     def _record_truth(self) -> None:
         """Records the truth of frames that are done and not told: those of an interrupted run, in short."""
@@ -222,7 +276,7 @@ class Launch:
         """Publishes and records the truth of frames that are done.
 
         Working out what each camera sees takes some time: in real time it is done when nothing else is, in
-        lockstep, where every processor is busy to the end, after the frames.
+        lockstep, where every processor is busy to the end, after the frames, unless somebody looks on.
         """
         while self._truth_next < until:
             message: TruthMessage | None = self._assembly.truth_message(self._truth_next)
@@ -233,15 +287,17 @@ class Launch:
                 self._recorder.add(message)
 
 
-def _decode(node: str, kind: str, data: bytes) -> EstimateMessage | StatusMessage:
+def _decode(node: str, kind: str, data: bytes) -> Heard:
     """What a node tells, under a key of its own.
 
     Raises:
         RefusedMessage: It is something else, or of somebody else.
     """
-    message: EstimateMessage | StatusMessage
+    message: Heard
     if kind == "estimate":
         message = codec.decode_public(EstimateMessage, data)
+    elif kind == "preview":
+        message = codec.decode_preview(data)
     else:
         message = codec.decode_public(StatusMessage, data)
     if message.node != node:

@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from network.zenoh import ZenohTransport
 from nodes.process import Shell, run_camera, run_central
 from sim.assembly import Assembly
+from sim.faults.process import FailingProcess
 from sim.scenario.parsing import ScenarioError
 
 
@@ -43,9 +44,10 @@ def run_node(
     shell = Shell(name, transport, assembly.pace, scenario.frames, stopped)
     try:
         if links.cameras:
-            run_central(assembly.central(), shell)
+            run_central(assembly.central(), links, shell)
         else:
-            run_camera(assembly.smart_camera(name), assembly.source(name), links, shell)
+            source = FailingProcess(assembly.source(name), name, scenario.faults)
+            run_camera(assembly.smart_camera(name), source, links, shell)
     finally:
         stopped.set()
         transport.close()

@@ -15,6 +15,7 @@ from nodes.filtering.fusion import FusionOptions
 from nodes.filtering.target import TargetOptions
 from nodes.pace import lag_for
 from nodes.setup import FilterOptions
+from sim.faults.options import FaultOptions, require_possible
 from sim.scenario.graphs import DescribedGraph
 from sim.scenario.presets import PresetName
 from sim.world.world import WorldOptions
@@ -177,6 +178,8 @@ class Scenario(Options):
     """The central node."""
     baselines: BaselineOptions = BaselineOptions()
     """What DCPF is compared with."""
+    faults: tuple[FaultOptions, ...] = ()
+    """What goes wrong, each by its `kind`, `frame` and, but for the router, `node`."""
 
     @model_validator(mode="after")
     def _world_or_footage(self) -> "Scenario":
@@ -238,6 +241,12 @@ class Scenario(Options):
         if target.part != "body" and (target.object is not None or target.space == "plane"):
             of_what = "a target on a plane" if target.space == "plane" else "an object"
             raise ValueError(f"target.part is {target.part}: {of_what} has no parts, leave it out")
+
+    @model_validator(mode="after")
+    def _faults(self) -> "Scenario":
+        names = [camera.name for camera in self.cameras]
+        require_possible(self.faults, names, self.frames, rendered=self.world is not None)
+        return self
 
     @model_validator(mode="after")
     def _network(self) -> "Scenario":

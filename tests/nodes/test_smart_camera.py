@@ -5,6 +5,7 @@ import pytest
 
 from network.consensus import Consensus
 from network.graph import ring
+from network.membership import Membership
 from network.messages import ConsensusMessage, EstimateMessage
 from network.weights import MetropolisWeights
 from nodes.estimator import SirEstimator
@@ -25,8 +26,15 @@ class Bench:
             name: SmartCamera(
                 room.models[name],
                 room.setup,
-                [Consensus(name, net.neighbors(name), MetropolisWeights(), N_ROUNDS)],
-                NAMES,
+                [
+                    Consensus(
+                        name,
+                        net.neighbors(name),
+                        MetropolisWeights(),
+                        N_ROUNDS,
+                        membership=Membership(name, net, N_ROUNDS),
+                    )
+                ],
                 SirEstimator(name, "single", room.setup) if with_single else None,
             )
             for name in NAMES
@@ -64,11 +72,12 @@ class Bench:
         self.deliver()
 
     def leave(self, gone):
-        """A node is gone, and with it what it had not sent yet."""
+        """A node is gone, and with it what it had not sent yet; its neighbours see it."""
         del self.nodes[gone]
         self.links = {link: queue for link, queue in self.links.items() if gone not in link}
-        for name, node in self.nodes.items():
-            self.hear(name, node.on_lost(gone))
+        for name in ring(NAMES).neighbors(gone):
+            if name in self.nodes:
+                self.hear(name, self.nodes[name].on_lost(gone))
 
     def error(self, frame, name):
         return np.linalg.norm(self.estimates[frame, name, "dcpf"].mean[:2] - self.room.position(frame))
