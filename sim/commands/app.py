@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 from rich.logging import RichHandler
 
+from sim.commands.bench import bench
 from sim.commands.clip import clip
 from sim.commands.compare import compare
 from sim.commands.guard import guarded
@@ -26,6 +27,7 @@ app = typer.Typer(
 )
 for command in (run, watch, compare, clip, node, central, check, schema, footage):
     app.command()(guarded(command))
+app.add_typer(bench)
 
 
 def main() -> NoReturn:
