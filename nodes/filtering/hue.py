@@ -39,8 +39,10 @@ def hue_bins(image: UInt8[np.ndarray, "H W 3"], n_bins: int) -> UInt8[np.ndarray
     """
     hsv = cv2.cvtColor(image.astype(np.float32), cv2.COLOR_BGR2HSV)
     hue, saturation, value = hsv[..., 0], hsv[..., 1], hsv[..., 2]
-    sector = ((hue + np.float32(NUDGE)) * np.float32((n_bins - 1) / 360)).astype(np.uint8)
+    sector = np.empty(hue.shape, np.uint8)
+    np.multiply(hue + np.float32(NUDGE), np.float32((n_bins - 1) / 360), out=sector, casting="unsafe")
     # C = S M, and 8 C < M where S < 1/8; the numbers in between are whole, or far away
-    grey = (saturation * value < GREY_CHROMA - 0.5) | (saturation < 1 / GREY_SATURATION - 1e-5)
+    grey = saturation * value < GREY_CHROMA - 0.5
+    grey |= saturation < 1 / GREY_SATURATION - 1e-5
     np.copyto(sector, n_bins - 1, where=grey, casting="unsafe")
     return sector

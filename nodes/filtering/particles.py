@@ -65,7 +65,7 @@ def normalize(log_weights: Float[np.ndarray, " N"]) -> tuple[Float[np.ndarray, "
 def reweight(particles: Particles, log_factors: Float[np.ndarray, " N"]) -> Particles:
     """Multiplies the weights by factors given as logarithms, and normalises (Eq. 12)."""
     # A flat likelihood says nothing, and changes nothing to the last bit.
-    if np.all(log_factors == log_factors[0]):
+    if (log_factors == log_factors[0]).all():
         return particles
     # ω(k) ∝ ω(k-1) · factor
     log_weights, _ = normalize(particles.log_weights + log_factors)
@@ -74,7 +74,8 @@ def reweight(particles: Particles, log_factors: Float[np.ndarray, " N"]) -> Part
 
 def effective_sample_size(particles: Particles) -> float:
     """1 / Σ ω²: how many equally weighted particles the sample is worth."""
-    return float(np.exp(-np.logaddexp.reduce(2 * particles.log_weights)))
+    weights = particles.weights
+    return float(1 / (weights @ weights))
 
 
 def systematic_indices(weights: Float[np.ndarray, " N"], offset: float) -> Int[np.ndarray, " N"]:
@@ -89,8 +90,8 @@ def systematic_indices(weights: Float[np.ndarray, " N"], offset: float) -> Int[n
     """
     n = len(weights)
     # The last particle that has any weight takes all above, and with it the rounding error of the sum.
-    last = np.flatnonzero(weights)[-1]
-    return np.searchsorted(np.cumsum(weights[:last]), (np.arange(n) + offset) / n, side="right")
+    last = weights.nonzero()[0][-1]
+    return weights[:last].cumsum().searchsorted((np.arange(n) + offset) / n, side="right")
 
 
 def resample_if_degenerate(particles: Particles, ess_threshold: float, rng: np.random.Generator) -> Particles:
@@ -99,4 +100,4 @@ def resample_if_degenerate(particles: Particles, ess_threshold: float, rng: np.r
     if effective_sample_size(particles) >= ess_threshold * n:
         return particles
     ancestor_indices = systematic_indices(particles.weights, float(rng.random()))
-    return Particles(particles.states[ancestor_indices], uniform_log_weights(n))
+    return Particles(particles.states.take(ancestor_indices, axis=0), uniform_log_weights(n))
