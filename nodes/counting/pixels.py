@@ -13,7 +13,7 @@ from jaxtyping import Float, Int, Integer, UInt8
 from nodes.counting.codebook import PLACES, Block, Codebook, Images
 
 FOUR_TIMES = np.uint32(0x01010101)
-CHUNK_BYTES = 700_000
+CHUNK_BYTES = 350_000
 """Integral images that are made at once: what stays in a core's cache. Everything at once is half as fast."""
 JOINED_ROWS = 8
 """Rows of pixels that are compared at once: NumPy takes its time between one piece of memory and the next."""
