@@ -123,7 +123,7 @@ def quantize(
     if options.space == "hue":
         return hue_bins(without_gain(image, gain), options.n_bins)[None]
     n = options.bins_per_channel
-    if 256 % n == 0 and np.all(gain == 1.0):
+    if 256 % n == 0 and (gain == 1.0).all():
         # floor(n · value / 256) without a table: the first bits of each channel
         bits = n.bit_length() - 1
         if options.space == "joint_rgb":
@@ -184,7 +184,7 @@ def without_gain(
     image: UInt8[np.ndarray, "H W 3"], gain: Float[np.ndarray, " 3"]
 ) -> UInt8[np.ndarray, "H W 3"]:
     """The picture with each channel's gain divided out, rounded to grey levels."""
-    if np.all(gain == 1.0):
+    if (gain == 1.0).all():
         return image
     levels = np.minimum(np.rint(_VALUES / gain[:, None]), 255).astype(np.uint8)
     return np.asarray(cv2.LUT(image, np.ascontiguousarray(levels.T)[None]), dtype=np.uint8)

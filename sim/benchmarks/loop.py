@@ -25,9 +25,12 @@ class LoopModel(ObservationModel):
     reference: Float32[np.ndarray, "..."] | None = None
 
     def box_distances(
-        self, picture: Picture, boxes: Float[np.ndarray, "N 4"], appearance: Appearance
+        self,
+        picture: Picture,
+        boxes: Float[np.ndarray, "N 4"],
+        appearance: Appearance,  # noqa: ARG002
     ) -> Float[np.ndarray, " N"]:
-        """d² of each box to the reference, that of `appearance` in OpenCV's form."""
+        """d² of each box to the reference, that of the loop itself."""
         color = self.options.color
         if self.reference is None:
             raise ValueError("the loop has no reference: make it by looping_like")

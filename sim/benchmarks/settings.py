@@ -1,6 +1,6 @@
 """The settings that the filter is measured in: three scenarios, in the middle of their run."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +21,7 @@ from nodes.setup import TrackingSetup
 from sim.assembly import Assembly
 from sim.benchmarks.loop import looping_like
 from sim.scenario.loading import load_scenario
+from sim.scenario.parsing import ScenarioError
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 """Where the scenarios are, in a checkout."""
@@ -74,25 +75,27 @@ class Setting:
         return lambda: sir_step(self.particles, views, motion, threshold, rng)
 
 
-def setting(letter: str, folder: Path) -> Setting:
+def setting(letter: str, folder: Path, overrides: Sequence[tuple[str, str]] = ()) -> Setting:
     """Runs a scenario's first camera until the frame that is measured.
 
     Args:
         letter: One of `SETTINGS`.
         folder: Where the scenarios are.
+        overrides: Keys and values set besides.
 
     Raises:
-        ScenarioError: A scenario is not there.
+        ScenarioError: A scenario is not there, or the camera does not see the target at the start.
     """
-    overrides = [("preset", "paper"), ("filter.sampling.grid", "null"), ("frames", str(FRAME + 1))]
-    assembly = Assembly(load_scenario(folder / f"{SETTINGS[letter]}.yaml", overrides))
+    path = folder / f"{SETTINGS[letter]}.yaml"
+    fixed = [("preset", "paper"), ("filter.sampling.grid", "null"), ("frames", str(FRAME + 1))]
+    assembly = Assembly(load_scenario(path, [*fixed, *overrides]))
     setup, camera = assembly.setup, next(iter(assembly.cameras))
     model, source = assembly.model(camera), assembly.source(camera)
     # frame 0: the reference
     start, first = setup.start.mean[: setup.target.n_axes], model.look(source.read(0))
     appearance = model.first_appearance(first, start)
     if appearance is None:
-        raise RuntimeError(f"camera {camera} does not see the target at the start")
+        raise ScenarioError(f"{path}: {camera} does not see the target at frame 0: take the shipped scenario")
     models = {
         LOOP: looping_like(model, first, project_boxes(start[None], setup.target, model.camera)[0]),
         **{name: _with_backend(model, name) for name in backends()},

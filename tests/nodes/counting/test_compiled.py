@@ -59,7 +59,9 @@ def test_counts_are_equal_to_the_last_one(seed, boxes, colors, parts, grid, shar
     counts, pixels = counts_compiled(*asked)
     np.testing.assert_array_equal(counts, expected)
     np.testing.assert_array_equal(pixels, in_parts)
-    pattern = Pattern(book, scale, tuple(np.searchsorted(book.part, np.arange(len(parts) + 1)).tolist()), perfect)
+    pattern = Pattern(
+        book, scale, tuple(np.searchsorted(book.part, np.arange(len(parts) + 1)).tolist()), perfect
+    )
     distances = squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
     np.testing.assert_allclose(distances_compiled(*asked), distances, atol=1e-12)
 
