@@ -1,7 +1,7 @@
 """Work over many particles in shares, one a thread: everything about threads inside a node lives here.
 
-Source: Truong & Kim (2017), Algorithms 1 and 2. NumPy, OpenCV and the compiled kernel let other threads run while
-they work on arrays, so that threads of one process share its cores.
+Source: Truong & Kim (2017), Algorithms 1 and 2. NumPy, OpenCV and the compiled kernel let other threads run
+while they work on arrays, so that threads of one process share its cores.
 """
 
 import os

@@ -14,6 +14,7 @@ from network.streams import stream
 from network.transport import Links, links_of
 from nodes.camera import Camera
 from nodes.central import Central
+from nodes.counting.build import load_kernel
 from nodes.filtering.observation import ObservationModel
 from nodes.setup import Start, TrackingSetup
 from nodes.smart_camera import SmartCamera
@@ -69,6 +70,8 @@ class Assembly:
         _ = self.cameras, self.links, self.setup
         if self.world is not None:
             _ = self.world.interior
+        if self.scenario.filter.backend == "compiled":
+            load_kernel()
 
     @cached_property
     def world(self) -> World | None:

@@ -152,8 +152,8 @@ def _from_integrals(
     for images in of_part:
         pixels = _numbers(bins, images.block, n_rows).reshape(n_pieces, piece)
         n_images = len(images.numbers)
-        alike = images.numbers.view(np.uint32).repeat(piece // PLACES).view(np.uint8)
-        alike = alike.reshape(n_images, 1, piece)
+        fours = images.numbers.view(np.uint32).repeat(piece // PLACES)
+        alike = fours.view(np.uint8).reshape(n_images, 1, piece)
         found = np.empty((n_images, 4, n_boxes), np.complex128)
         for first in range(0, n_images, at_once):
             n = min(at_once, n_images - first)
@@ -164,7 +164,7 @@ def _from_integrals(
             by_image = entries[: n * n_rows * (width + 1)].reshape(n, -1)
             by_image.take(corners, axis=1, mode="clip", out=found[first : first + n])
         sums = found.view(np.int32).reshape(n_images, 4, n_boxes * PLACES)
-        # I(b, r) - I(b, l) - I(t, r) + I(t, l)
+        # bottom right, less what is left of the box, less what is above it, and what is both
         total = sums[:, 3] - sums[:, 2]
         total -= sums[:, 1]
         total += sums[:, 0]

@@ -128,8 +128,8 @@ def quantize(
         bits = n.bit_length() - 1
         if options.space == "joint_rgb":
             return _joint_bits(image, bits)[None]
-        rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGBA)
-        rgb >>= 8 - bits
+        rgba = cv2.cvtColor(image, cv2.COLOR_BGR2RGBA)
+        rgb = np.right_shift(rgba, 8 - bits, out=rgba)
     else:
         tables = _tables(options, gain).astype(np.uint8 if options.n_bins <= 256 else np.uint16)
         values = cv2.LUT(image, np.ascontiguousarray(tables.T)[None])

@@ -1,8 +1,8 @@
 """Threads against one: the steps of the filter, and a whole clip (Truong & Kim 2017, Fig. 4 to 7).
 
-Their names for the steps: *shuffling* moves the particles, *likelihood* compares their boxes with the target, and
-*resampling* draws the new ones. The shuffle has one thread here: its draws come from one stream, one after the
-other.
+Their names for the steps: *shuffling* moves the particles, *likelihood* compares their boxes with the target,
+and *resampling* draws the new ones. The shuffle has one thread here: its draws come from one stream, one
+after the other.
 """
 
 import time
@@ -119,7 +119,8 @@ def _steps(chosen: Setting, n_threads: int) -> dict[str, Times]:
 def _clip(folder: Path, n: int, n_threads: int, n_frames: int | None) -> dict[str, float]:
     """Frames a second of the tracker on ready pictures, as the program would run it.
 
-    Both run side by side, frame after frame, so that a disturbance meets both; they must agree to the last bit.
+    Both run side by side, frame after frame, so that a disturbance meets both; they must agree to the last
+    bit.
     """
     overrides = [("filter.n_particles", str(n)), *([("frames", str(n_frames))] if n_frames else [])]
     assembly = Assembly(load_scenario(folder / f"{SETTINGS['B']}.yaml", overrides))
@@ -134,7 +135,8 @@ def _clip(folder: Path, n: int, n_threads: int, n_frames: int | None) -> dict[st
     took = np.zeros((assembly.scenario.frames - 1, len(runs)))
     for frame in range(1, assembly.scenario.frames):
         image = source.read(frame)
-        for number, run in enumerate(runs):
+        for number in (0, 1) if frame % 2 else (1, 0):
+            run = runs[number]
             began = time.perf_counter()
             view = View(run.model, run.model.look(image), appearance)
             threshold = setup.filter.resampling.threshold

@@ -10,13 +10,14 @@ import typer
 from rich.console import Console
 
 from network.errors import NetworkError
+from nodes.counting.build import KernelError
 from nodes.sources import SourceError
 from sim.footage import FootageError
 from sim.running.children import RunFailed
 from sim.running.recorder import RecordingError
 from sim.scenario.parsing import ScenarioError
 
-USERS_ERRORS = (ScenarioError, NetworkError, SourceError, FootageError, RecordingError)
+USERS_ERRORS = (ScenarioError, NetworkError, SourceError, FootageError, RecordingError, KernelError)
 """What the user can put right: exit code 2."""
 
 

@@ -1,7 +1,7 @@
 """The figure of the filter by one thread and by several: time of each step, and the clip's frames per second.
 
-After Truong & Kim (2017), Fig. 4 to 7, over the number of particles. Imports matplotlib: what only runs scenarios
-does not import this module.
+After Truong & Kim (2017), Fig. 4 to 7, over the number of particles. Imports matplotlib: what only runs
+scenarios does not import this module.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,7 +34,7 @@ def plot_parallel(report: Mapping[str, Any]) -> Figure:
     """
     figure = Figure(figsize=(11.0, 3.4), layout="constrained")
     axes = [cleaned(panel) for panel in figure.subplots(1, 4)]
-    for panel, step in zip(axes, _TITLES, strict=False):
+    for panel, step in zip(axes[:3], _TITLES, strict=True):
         _draw_step(panel, report["steps"], step)
     axes[0].set_ylabel("time / ms")
     _draw_rates(axes[3], report["frames_per_s_by_particles"])
@@ -65,7 +65,8 @@ def _draw_rates(axes: Axes, rates: Mapping[Any, Mapping[str, float]]) -> None:
     for place, rate in enumerate(rates.values()):
         for offset, way, color in ((-0.2, "sequential", _ONE), (0.2, "parallel", _SEVERAL)):
             axes.bar(place + offset, rate[way], 0.36, color=color)
-            axes.text(place + offset, rate[way], f"{rate[way]:.3g}", ha="center", va="bottom", size=8)
+            words = f"{rate[way]:.1f}" if rate[way] < 100 else f"{rate[way]:,.0f}"
+            axes.text(place + offset, rate[way], words, ha="center", va="bottom", size=8)
     axes.set(yscale="log", ylabel="frames/s", xlabel="particles", title="whole clip")
     axes.set_xticks(range(len(rates)), [f"{int(n):,}" for n in rates])
     axes.grid(visible=False, axis="x")
