@@ -7,6 +7,7 @@ from sim.benchmarks import parallel
 from sim.benchmarks.filtering import bench_filter, n_rounds
 from sim.benchmarks.settings import LOOP, SCENARIOS, SETTINGS, setting
 from sim.benchmarks.timing import times_in_turn
+from sim.pictures.parallel import plot_parallel
 
 
 @pytest.fixture(scope="module", params=SETTINGS)
@@ -74,3 +75,21 @@ def test_times_are_medians_of_equal_turns():
     )
     assert took == {"a": 1.0, "b": 1.0}  # one tick between two looks at the clock
     assert calls[4:] == ["a", "a", "b", "b"] * 3  # after two calls of each to see how long they take
+
+
+def test_the_plot_has_a_panel_for_each_step_and_one_for_the_clip():
+    times = {"sequential": 2.0, "parallel": 1.0}
+    rows = [
+        {
+            "particles": n,
+            "threads_used": {"likelihood": used, "resampling": used},
+            "ms": {"likelihood": times, "resampling": times, "shuffle": times},
+        }
+        for n, used in ((300, 1), (100_000, 2))
+    ]
+    rates = {300: {"sequential": 900.0, "parallel": 900.0}, 100_000: {"sequential": 9.0, "parallel": 15.0}}
+    figure = plot_parallel({"threads": 2, "steps": rows, "frames_per_s_by_particles": rates})
+    titles = [axes.get_title() for axes in figure.axes]
+    assert titles == ["shuffling: one thread", "resampling", "likelihood", "whole clip"]
+    heights = [bar.get_height() for bar in figure.axes[3].patches]
+    assert heights == [900.0, 900.0, 9.0, 15.0]
