@@ -73,11 +73,11 @@ def parallel(
     as_json: AsJson = False,
 ) -> None:
     """Compare the filter's steps, and a whole clip, by one thread and by several."""
-    from sim.benchmarks.parallel import PARTICLES, bench_parallel
+    from sim.benchmarks.parallel import CLIP_PARTICLES, PARTICLES, bench_parallel
 
     if out is not None:
         make_folder(out)
-    with counting_bar("bench parallel", len(PARTICLES) + 2) as done:
+    with counting_bar("bench parallel", len(PARTICLES) + len(CLIP_PARTICLES)) as done:
         report = bench_parallel(folder, threads or os.cpu_count() or 1, done)
     if out is not None:
         from sim.pictures.parallel import plot_parallel
@@ -100,9 +100,9 @@ def _print_parallel(report: dict[str, Any]) -> None:
         cells = [f"{row['particles']:,}"]
         for step in ("likelihood", "resampling"):
             one, several = row["ms"][step]["sequential"], row["ms"][step]["parallel"]
-            verdict = f"{one / several:.2f} x" if row["threads_used"][step] > 1 else "one is used"
-            cells += [f"{one:.2f}, {several:.2f}", verdict]
-        table.add_row(*cells, f"{row['ms']['shuffle']['sequential']:.2f}")
+            verdict = f"{one / several:.2f} x" if row["threads_used"][step] > 1 else "one used"
+            cells += [f"{one:.3g}, {several:.3g}", verdict]
+        table.add_row(*cells, f"{row['ms']['shuffle']['sequential']:.3g}")
     console.print(table)
     for n, rate in report["frames_per_s_by_particles"].items():
         console.print(

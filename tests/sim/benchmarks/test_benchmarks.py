@@ -58,6 +58,7 @@ def test_the_report_has_a_ratio_for_each_backend():
 
 def test_threads_and_one_thread_agree_in_the_clip(monkeypatch):
     monkeypatch.setattr(parallel, "PARTICLES", (300, 17_000))
+    monkeypatch.setattr(parallel, "CLIP_PARTICLES", (300, 17_000))
     monkeypatch.setattr(parallel, "ROUNDS", 1)
     report = parallel.bench_parallel(SCENARIOS, 2, n_frames=4)
     assert report["threads"] == 2
