@@ -5,18 +5,22 @@ Messages between nodes are little-endian and begin with one header of 24 bytes:
 | offset | type | field |
 |---|---|---|
 | 0 | u8 | version of this layout, 1 |
-| 1 | u8 | kind: 1 consensus, 2 pixels, 3 confirm |
+| 1 | u8 | kind in the lower four bits: 1 consensus, 2 pixels, 3 confirm |
+|   |    | encoding in the upper four: consensus: 0 float64, 1 float32, 2 float16; others 0 |
 | 2 | 3 x u16 | consensus: numbers in the payload K, round, sender's degree; pixels: height, width, 0 |
 | 8 | u64 | run: BLAKE2b of its name, 8 bytes |
 | 16 | u32 | sender: BLAKE2b of its name, 4 bytes |
 | 20 | u32 | frame |
-| 24 | | consensus: K float64; pixels: height x width x 3 bytes, BGR |
+| 24 | | consensus: K numbers, float16 ones after an i16 e and times 2^e; pixels: height x width x 3, BGR |
+
+A preview is a JPEG that any viewer shows; what else it says is JSON in the picture's comment.
 
 Reading never trusts: what is not exactly such a message is refused with its reason.
 """
 
 import json
 import struct
+from dataclasses import replace
 from functools import lru_cache
 from hashlib import blake2b
 from typing import Any, TypeVar
@@ -25,6 +29,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from pydantic import TypeAdapter, ValidationError
 
+from network import jpeg
 from network.errors import RefusedMessage
 from network.messages import (
     ConfirmMessage,
@@ -34,22 +39,31 @@ from network.messages import (
     Message,
     PeerMessage,
     PixelsMessage,
+    PreviewMessage,
     PublicMessage,
     StatusMessage,
     TruthMessage,
 )
+from network.quantization import ENCODINGS, LARGEST, Encoding, half_exponent
 
 VERSION = 1
 MAX_PIXELS = 64_000_000
 MAX_JSON_BYTES = 1_000_000
-MAX_MAGNITUDE = 1e150
+MAX_JPEG_BYTES = 20_000_000
+MAX_MAGNITUDE = LARGEST["float64"]
 """Larger numbers are refused like infinity: sums and products of them would overflow."""
 
 _HEADER = struct.Struct("<BBHHHQII")
-_NUMBER = np.dtype("<f8")
+_NUMBERS: dict[Encoding, np.dtype[np.floating]] = {
+    "float64": np.dtype("<f8"),
+    "float32": np.dtype("<f4"),
+    "float16": np.dtype("<f2"),
+}
+_EXPONENT = struct.Struct("<h")
 _KINDS: dict[type[PeerMessage], int] = {ConsensusMessage: 1, PixelsMessage: 2, ConfirmMessage: 3}
 _JSON: dict[type, TypeAdapter[Any]] = {
-    kind: TypeAdapter(kind) for kind in (EstimateMessage, ControlMessage, StatusMessage, TruthMessage)
+    kind: TypeAdapter(kind)
+    for kind in (EstimateMessage, ControlMessage, StatusMessage, TruthMessage, PreviewMessage)
 }
 _JSON_REASONS = {"json_invalid": "json", "finite_number": "not-finite", "value_error": "shape"}
 
@@ -69,6 +83,8 @@ def encode(run: str, message: Message) -> bytes:
             return encode_pixels(run, message)
         case ConfirmMessage():
             return encode_confirm(run, message)
+        case PreviewMessage():
+            return encode_preview(message)
         case _:
             return encode_public(message)
 
@@ -103,25 +119,38 @@ def encode_consensus(run: str, message: ConsensusMessage) -> bytes:
         raise ValueError(
             f"{message.sender} has a value that is not finite in frame {message.frame}: {payload}"
         )
-    header = _header(run, message, payload.size, message.round, message.degree)
-    return header + payload.astype(_NUMBER, copy=False).tobytes()
+    header = _header(run, message, payload.size, message.round, message.degree, message.encoding)
+    scale = b""
+    if message.encoding == "float16":
+        exponent = half_exponent(payload)
+        payload, scale = np.ldexp(payload, -exponent), _EXPONENT.pack(exponent)
+    return header + scale + payload.astype(_NUMBERS[message.encoding], copy=False).tobytes()
 
 
 def decode_consensus(run: str, sender: str, data: bytes) -> ConsensusMessage:
-    """A round's value; its payload is a read-only view of the data.
+    """A round's value; its payload is read-only, and a view of the data where they are float64.
 
     Raises:
         RefusedMessage: The data are not such a message.
     """
-    frame, size, round_, degree = _read_header(ConsensusMessage, run, sender, data)
-    if len(data) != _HEADER.size + 8 * size:
+    frame, size, round_, degree, encoding = _read_header(ConsensusMessage, run, sender, data)
+    number, start = _NUMBERS[encoding], _HEADER.size + _EXPONENT.size * (encoding == "float16")
+    if len(data) != start + number.itemsize * size:
         raise RefusedMessage("length")
     if round_ < 1:
         raise RefusedMessage("round")
-    payload = np.frombuffer(data, _NUMBER, size, _HEADER.size)
+    payload = np.frombuffer(data, number, size, start)
+    if encoding != "float64":
+        payload = payload.astype(float)
+        if encoding == "float16":
+            # an exponent beyond all floats gives infinity, which is refused
+            (exponent,) = _EXPONENT.unpack_from(data, _HEADER.size)
+            with np.errstate(over="ignore", invalid="ignore"):
+                payload = np.ldexp(payload, exponent)
+        payload.flags.writeable = False
     if not _usable(payload):
         raise RefusedMessage("not-finite")
-    return ConsensusMessage(sender, frame, round_, degree, payload)
+    return ConsensusMessage(sender, frame, round_, degree, payload, encoding)
 
 
 def encode_pixels(run: str, message: PixelsMessage) -> bytes:
@@ -136,7 +165,7 @@ def decode_pixels(run: str, sender: str, data: bytes) -> PixelsMessage:
     Raises:
         RefusedMessage: The data are not such a message, or the picture has more than ``MAX_PIXELS``.
     """
-    frame, height, width, _ = _read_header(PixelsMessage, run, sender, data)
+    frame, height, width, *_ = _read_header(PixelsMessage, run, sender, data)
     if not 0 < height * width <= MAX_PIXELS:
         raise RefusedMessage("size")
     if len(data) != _HEADER.size + 3 * height * width:
@@ -168,8 +197,7 @@ def encode_public(message: PublicMessage) -> bytes:
     Raises:
         ValueError: A number in it is not finite.
     """
-    fields = _JSON[type(message)].dump_python(message, mode="json")
-    return json.dumps(fields, separators=(",", ":"), allow_nan=False).encode()
+    return _to_json(message)
 
 
 def decode_public(kind: type[_Public], data: bytes) -> _Public:
@@ -180,12 +208,33 @@ def decode_public(kind: type[_Public], data: bytes) -> _Public:
     """
     if len(data) > MAX_JSON_BYTES:
         raise RefusedMessage("length")
-    try:
-        message: _Public = _JSON[kind].validate_json(data)
-    except ValidationError as error:
-        found = error.errors(include_url=False, include_context=False)[0]["type"]
-        raise RefusedMessage(_JSON_REASONS.get(found, "fields")) from error
+    message: _Public = _from_json(kind, data)
     return message
+
+
+def encode_preview(message: PreviewMessage) -> bytes:
+    """A preview: its picture, with everything else in the comment.
+
+    Raises:
+        ValueError: There are too many particles for a comment.
+    """
+    return jpeg.with_comment(message.jpeg, _to_json(message))
+
+
+def decode_preview(data: bytes) -> PreviewMessage:
+    """A preview; the picture itself is not looked into.
+
+    Raises:
+        RefusedMessage: The data are not such a message.
+    """
+    if len(data) > MAX_JPEG_BYTES:
+        raise RefusedMessage("length")
+    parts = jpeg.without_comment(data)
+    if parts is None:
+        raise RefusedMessage("jpeg")
+    picture, comment = parts
+    message: PreviewMessage = _from_json(PreviewMessage, comment)
+    return replace(message, jpeg=picture)
 
 
 def pack_symmetric(matrix: Float[np.ndarray, "D D"]) -> Float[np.ndarray, " K"]:
@@ -217,6 +266,19 @@ def _places(size: int) -> Int[np.ndarray, "D D"]:
     return places
 
 
+def _to_json(message: PublicMessage | PreviewMessage) -> bytes:
+    fields = _JSON[type(message)].dump_python(message, mode="json")
+    return json.dumps(fields, separators=(",", ":"), allow_nan=False).encode()
+
+
+def _from_json(kind: type, data: bytes) -> Any:
+    try:
+        return _JSON[kind].validate_json(data)
+    except ValidationError as error:
+        found = error.errors(include_url=False, include_context=False)[0]["type"]
+        raise RefusedMessage(_JSON_REASONS.get(found, "fields")) from error
+
+
 def _usable(payload: Float[np.ndarray, " K"]) -> bool:
     """Whether all numbers are finite and small enough to compute with; not so for NaN."""
     # A round has so few that Python's own numbers are faster than NumPy's.
@@ -228,23 +290,25 @@ def _digest(name: str, size: int) -> int:
     return int.from_bytes(blake2b(name.encode(), digest_size=size).digest(), "little")
 
 
-def _header(run: str, message: PeerMessage, a: int, b: int, c: int) -> bytes:
-    return _HEADER.pack(
-        VERSION, _KINDS[type(message)], a, b, c, _digest(run, 8), _digest(message.sender, 4), message.frame
-    )
+def _header(run: str, message: PeerMessage, a: int, b: int, c: int, encoding: Encoding = "float64") -> bytes:
+    code = _KINDS[type(message)] | ENCODINGS.index(encoding) << 4
+    return _HEADER.pack(VERSION, code, a, b, c, _digest(run, 8), _digest(message.sender, 4), message.frame)
 
 
-def _read_header(kind: type[PeerMessage], run: str, sender: str, data: bytes) -> tuple[int, int, int, int]:
-    """Frame and the three numbers that depend on the kind."""
+def _read_header(
+    kind: type[PeerMessage], run: str, sender: str, data: bytes
+) -> tuple[int, int, int, int, Encoding]:
+    """Frame, the three numbers that depend on the kind, and the encoding of the payload."""
     if len(data) < _HEADER.size:
         raise RefusedMessage("length")
     version, code, a, b, c, run_id, sender_id, frame = _HEADER.unpack_from(data)
     if version != VERSION:
         raise RefusedMessage("version")
-    if code != _KINDS[kind]:
+    encoding = code >> 4
+    if code & 0x0F != _KINDS[kind] or encoding >= (len(ENCODINGS) if kind is ConsensusMessage else 1):
         raise RefusedMessage("kind")
     if run_id != _digest(run, 8):
         raise RefusedMessage("run")
     if sender_id != _digest(sender, 4):
         raise RefusedMessage("sender")
-    return frame, a, b, c
+    return frame, a, b, c, ENCODINGS[encoding]

@@ -6,12 +6,14 @@ one waited for will not come. A neighbour that keeps to the rounds is never more
 
 from collections import Counter
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
+from network.averaging.algorithm import Algorithm
 from network.messages import ConsensusMessage
-from network.weights import Weights
+from network.quantization import Quantizer
 
 _Position = tuple[int, int]
 """Frame and round, in the order in which a node goes through them."""
@@ -20,7 +22,10 @@ _NOWHERE: _Position = (-1, 0)
 
 
 class Consensus:
-    """Average consensus of one node with its neighbours, frame after frame (Eq. 3 of Jing & Chen).
+    """Average consensus of one node with its neighbours, frame after frame.
+
+    What a round does to the node's state is the algorithm's affair (`network.averaging`), the plain one being
+    Eq. 3 of Jing & Chen; who takes part in it and when it is over is decided here.
 
     Methods that may complete rounds return the messages to send to all neighbours now, in order. There may be
     several: where one neighbour held a round up, the next round's messages of the others can be here already.
@@ -28,36 +33,48 @@ class Consensus:
     Attributes:
         name: The node.
         neighbors: Whom it exchanges messages with, sorted by name: the order in which they are summed.
-        value: The state after the rounds done so far, which estimates the average over all nodes.
         rounds_done: Rounds done in this frame.
         done: Whether this frame's rounds are over.
         counters: Messages that were of no use, by reason, and frames that were ``cut``.
     """
 
-    def __init__(self, name: str, neighbors: Iterable[str], weights: Weights, iterations: int) -> None:
+    def __init__(
+        self,
+        name: str,
+        neighbors: Iterable[str],
+        algorithm: Algorithm[Any],
+        iterations: int,
+        quantizer: Quantizer | None = None,
+    ) -> None:
         """A node before its first frame.
 
         Args:
             name: The node.
             neighbors: Whom it exchanges messages with.
-            weights: The rule of weights, the same in all nodes.
+            algorithm: How they average, the same in all nodes.
             iterations: Rounds in each frame, at least 0.
+            quantizer: Rounds what it sends; None for the full numbers.
         """
         self.name = name
         self.neighbors = tuple(sorted(neighbors))
-        self.value: Float[np.ndarray, " K"] = np.empty(0)
         self.rounds_done = 0
         self.done = True
         self.counters: Counter[str] = Counter()
-        self._weights = weights
-        self._iterations = iterations
+        self._algorithm, self._iterations = algorithm, iterations
+        self._quantizer = quantizer or Quantizer()
+        self._state: Any = None  # of the algorithm's own type; None before the first frame
+        self._said: ConsensusMessage  # in this round
         self._position = _NOWHERE
-        self._degree = 0
         self._gone: set[str] = set()
         self._absent: set[str] = set()  # in this frame: the gone, also those restored during it
         self._heard = dict.fromkeys(self.neighbors, _NOWHERE)
         self._inbox: dict[tuple[int, str], ConsensusMessage] = {}  # of this frame, by round and sender
         self._early: dict[str, ConsensusMessage] = {}  # first rounds of later frames, by sender
+
+    @property
+    def value(self) -> Float[np.ndarray, " K"]:
+        """The estimate, after the rounds done so far, of the average over all nodes."""
+        return np.empty(0) if self._state is None else self._state.value
 
     def begin(self, frame: int, value: Float[np.ndarray, " K"]) -> tuple[ConsensusMessage, ...]:
         """Starts a frame with the node's own value.
@@ -68,7 +85,7 @@ class Consensus:
         last_frame, _ = self._position
         if not self.done or frame <= last_frame:
             raise ValueError(f"{self.name} cannot begin frame {frame}: it is in frame {last_frame}")
-        self.value = np.array(value, dtype=float)
+        self._state = self._algorithm.begin(np.array(value, dtype=float), self._state)
         self.rounds_done = 0
         self.done = False
         self._absent = set(self._gone)
@@ -112,6 +129,14 @@ class Consensus:
         """Counts on a neighbour again, from the next frame on."""
         self._gone.discard(neighbor)
 
+    def expire(self) -> tuple[ConsensusMessage, ...]:
+        """Does this round without those that are late; they take part in the next one."""
+        if self.done:
+            return ()
+        self.counters["late"] += len(self.waiting_for())
+        self._step()
+        return self._enter_round(self._position[0]) + self._advance()
+
     def cut(self) -> None:
         """Ends the frame with the rounds done so far."""
         if not self.done:
@@ -132,7 +157,8 @@ class Consensus:
     def _keep(self, message: ConsensusMessage) -> None:
         """Keeps a message that this round, the next one, or a later frame's first can use."""
         frame, round_ = self._position
-        if (message.frame, message.round) < self._position:
+        late = (message.frame, message.round) < self._position
+        if late and not (self._algorithm.uses_late and message.frame == frame and not self.done):
             self.counters["old"] += 1
         elif message.frame > frame and message.round == 1:
             self._early[message.sender] = message
@@ -140,19 +166,22 @@ class Consensus:
             self.counters["ahead"] += 1
         elif message.sender in self._absent:
             self.counters["absent"] += 1
-        elif message.payload.shape != self.value.shape:
+        elif not self._algorithm.fits(self._state, message):
             self.counters["shape"] += 1
         else:
-            self._inbox[message.round, message.sender] = message
+            self._inbox[max(message.round, round_), message.sender] = message
 
     def _enter_round(self, frame: int) -> tuple[ConsensusMessage, ...]:
         """Enters the round after those done, or ends the frame where there is none or nobody to talk to."""
-        self._position = (frame, self.rounds_done + 1)
-        self._degree = len(self._present())
-        if self.rounds_done == self._iterations or self._degree == 0:
+        round_ = self.rounds_done + 1
+        self._position = (frame, round_)
+        degree = len(self._present())
+        if self.rounds_done == self._iterations or degree == 0:
             self._finish()
             return ()
-        return (ConsensusMessage(self.name, frame, self.rounds_done + 1, self._degree, self.value),)
+        payload = self._quantizer(self._algorithm.payload(self._state, degree))
+        self._said = ConsensusMessage(self.name, frame, round_, degree, payload, self._quantizer.encoding)
+        return (self._said,)
 
     def _advance(self) -> tuple[ConsensusMessage, ...]:
         """Completes rounds as long as nobody is waited for."""
@@ -165,13 +194,9 @@ class Consensus:
     def _step(self) -> None:
         """One round, with the messages that have come for it."""
         _, round_ = self._position
-        own, value = self.value, self.value.copy()
-        for name in self.neighbors:
-            message = self._inbox.pop((round_, name), None)
-            if message is not None:
-                # a_l(t) = a_l(t-1) + Σ_j w_lj (a_j(t-1) - a_l(t-1))
-                value += self._weights.weight(self._degree, message.degree) * (message.payload - own)
-        self.value = value
+        found = [self._inbox.pop((round_, name), None) for name in self.neighbors]
+        received = [message for message in found if message is not None]
+        self._state = self._algorithm.step(self._state, self._said, received)
         self.rounds_done += 1
 
     def _finish(self) -> None:

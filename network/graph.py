@@ -5,8 +5,9 @@ nothing but NumPy.
 """
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -26,6 +27,15 @@ class Graph:
 
     names: tuple[str, ...]
     edges: frozenset[Edge]
+    _neighbors: Mapping[str, tuple[str, ...]] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        found: dict[str, list[str]] = {name: [] for name in self.names}
+        for a, b in self.edges:
+            found[a].append(b)
+            found[b].append(a)
+        sorted_ = {name: tuple(sorted(others)) for name, others in found.items()}
+        object.__setattr__(self, "_neighbors", sorted_)
 
     @staticmethod
     def from_edges(names: Iterable[str], edges: Iterable[Edge]) -> "Graph":
@@ -35,12 +45,13 @@ class Graph:
             ValueError: A name is there twice, an edge names no node, or it joins a node to itself.
         """
         names = tuple(names)
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"node {name} is in the graph twice: give each node its own name")
+        known = set(names)
+        if len(known) < len(names):
+            (name, _), *_ = Counter(names).most_common(1)
+            raise ValueError(f"node {name} is in the graph twice: give each node its own name")
         pairs = [_pair(a, b) for a, b in edges]
         for a, b in pairs:
-            unknown = sorted({a, b} - set(names))
+            unknown = sorted({a, b} - known)
             if unknown:
                 raise ValueError(
                     f"edge {a}-{b} names {unknown[0]}, which is no node; nodes: {', '.join(names)}"
@@ -60,9 +71,9 @@ class Graph:
         Raises:
             ValueError: There is no node of this name.
         """
-        if name not in self.names:
+        if name not in self._neighbors:
             raise ValueError(f"{name} is no node of the graph; nodes: {', '.join(self.names)}")
-        return tuple(sorted(b if a == name else a for a, b in self.edges if name in (a, b)))
+        return self._neighbors[name]
 
     def degree(self, name: str) -> int:
         """How many neighbours a node has."""

@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from network.consensus import Consensus
-from network.messages import ConsensusMessage, EstimateMessage
+from network.messages import ConsensusMessage, EstimateMessage, PreviewMessage
+from nodes.array_estimator import ArrayEstimator
 from nodes.estimator import SirEstimator
 from nodes.filtering.appearance import Appearance, pack_looks, settled, unpack_looks
 from nodes.filtering.fusion import fuse, is_density, pack, propagate, unpack
@@ -20,7 +21,10 @@ from nodes.filtering.local import LocalResult, local_filter
 from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.particles import Particles, effective_sample_size, resample_if_degenerate
 from nodes.filtering.sighting import Sighting, shrinkage_by
+from nodes.preview import preview
 from nodes.setup import TrackingSetup
+from nodes.simd.report import FrameReport
+from nodes.telemetry import Counters
 
 Outgoing = tuple[ConsensusMessage | EstimateMessage, ...]
 
@@ -47,8 +51,7 @@ class SmartCamera:
         setup: TrackingSetup,
         consensus: Consensus,
         cameras: tuple[str, ...],
-        *,
-        with_single: bool,
+        single: SirEstimator | ArrayEstimator | None = None,
     ) -> None:
         """A camera before its first frame.
 
@@ -57,7 +60,7 @@ class SmartCamera:
             setup: What the run tracks.
             consensus: Its part of the averaging.
             cameras: The cameras of the network.
-            with_single: Whether to run the camera's own filter beside, as a baseline.
+            single: The camera's own filter beside, as a baseline.
         """
         self.name = model.camera.name
         self._indefinite: Counter[str] = Counter(indefinite_local=0, indefinite_fused=0)
@@ -71,7 +74,7 @@ class SmartCamera:
         self._sighting = Sighting()
         self._frame: FrameInProgress | None = None
         self._last_frame = 0
-        self._single = SirEstimator(self.name, "single", setup) if with_single else None
+        self._single = single
 
     def on_frame(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> Outgoing:
         """A picture has been taken: filters it and opens the frame's consensus.
@@ -111,20 +114,38 @@ class SmartCamera:
         self._consensus.cut()
         return self._with_result(())
 
+    def preview(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> PreviewMessage:
+        """What a frame that is done looks like, for people."""
+        run, time_s = self._setup.run, index / self._setup.rate_hz
+        return preview(run, self.name, index, time_s, image, self._particles)
+
     @property
     def waiting_for(self) -> tuple[str, ...]:
         """Neighbours without whose message the frame cannot go on; none when it is done."""
         return self._consensus.waiting_for()
 
     @property
-    def counters(self) -> dict[str, int | dict[str, int]]:
+    def counters(self) -> Counters:
         """What it has counted.
 
         Frames in which the local (`indefinite_local`) or the fused (`indefinite_fused`) difference of
         information matrices was not positive semidefinite, so that Eq. 17 had no density; and messages
-        of the rounds that were of no use, by reason (`unused`).
+        of the rounds that were of no use, by reason (`unused`); the cost of a frame on the emulated array
+        (`simd`), if there is one.
         """
-        return {**self._indefinite, "unused": dict(self._consensus.counters)}
+        report = self._array_report
+        return {
+            **self._indefinite,
+            "unused": dict(self._consensus.counters),
+            **({"simd": report.figures} if report else {}),
+        }
+
+    @property
+    def _array_report(self) -> FrameReport | None:
+        """What the last frame has cost on the emulated array: the whole tracker, or the likelihoods."""
+        if isinstance(self._single, ArrayEstimator) and self._last_frame:
+            return self._single.report
+        return self._model.processor.report if self._model.processor else None
 
     @property
     def rounds_done(self) -> int:
@@ -177,7 +198,7 @@ class SmartCamera:
         message = self._message(frame, estimate, ess, visible=visible)
         if self._single is None:
             return (message,)
-        return message, self._single.step(frame.index, {self.name: (self._model, frame.picture)})
+        return message, self._single.step(frame.index, {self.name: (self._model.off_array, frame.picture)})
 
     def _update_appearance(self, picture: Picture, position: Float[np.ndarray, " A"]) -> bool:
         """Updates the reference by what the estimate's box shows; returns whether it shows the target."""
@@ -207,6 +228,8 @@ class SmartCamera:
         message = self._message(frame, self._setup.start.moments, n, visible=visible)
         if self._single is None:
             return (message,)
+        if isinstance(self._single, ArrayEstimator):
+            return message, self._single.begin(frame.picture, self._appearance)
         return message, self._single.begin({self.name: self._appearance})
 
     def _message(

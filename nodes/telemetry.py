@@ -10,7 +10,7 @@ from network.messages import StatusMessage
 from network.transport import Traffic
 
 State = Literal["ready", "running", "done", "failed"]
-Counters = Mapping[str, int | Mapping[str, int]]
+Counters = Mapping[str, int | Mapping[str, int | float]]
 """What a node has counted, by name; groups by name and reason."""
 
 

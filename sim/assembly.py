@@ -1,22 +1,27 @@
 """Puts a run together: from a resolved scenario to the nodes, their pictures and the truth."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from network.averaging.algorithm import Algorithm
 from network.consensus import Consensus
 from network.graph import Graph
 from network.messages import TruthMessage, Visibility
 from network.streams import stream
 from network.transport import Links, links_of
+from nodes.array_estimator import ArrayEstimator
 from nodes.camera import Camera
 from nodes.central import Central
 from nodes.counting.build import load_kernel
+from nodes.estimator import SirEstimator
 from nodes.filtering.observation import ObservationModel
 from nodes.setup import Start, TrackingSetup
+from nodes.simd.likelihood import SimdLikelihood
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
 from sim.scenario.loading import cameras_of, video_source
@@ -61,13 +66,19 @@ class Assembly:
         return self.scenario.graph
 
     @cached_property
+    def algorithm(self) -> Algorithm[Any]:
+        """How the cameras average, tuned to their graph."""
+        network = self.scenario.network
+        return network.consensus.tuned(self.graph, network.iterations)
+
+    @cached_property
     def links(self) -> Mapping[str, Links]:
         """The nodes, the central one last if there is one, and whom each exchanges messages with."""
         return links_of(self.graph, [self.scenario.central.name] if self.scenario.baselines.cpf else [])
 
     def prepare(self) -> None:
         """Works out what all nodes share, before they part."""
-        _ = self.cameras, self.links, self.setup
+        _ = self.cameras, self.links, self.algorithm, self.setup
         if self.world is not None:
             _ = self.world.interior
         if self.scenario.filter.backend == "compiled":
@@ -143,18 +154,48 @@ class Assembly:
         )
 
     def model(self, camera: str) -> ObservationModel:
-        """The observation model of a camera."""
+        """The observation model of a camera, on the machine that this is."""
         return ObservationModel(self.cameras[camera], self.scenario.target, self.scenario.filter)
+
+    def model_on_camera(self, camera: str) -> ObservationModel:
+        """The observation model of a camera on its own processor.
+
+        Raises:
+            ScenarioError: The processor cannot do what the options ask for.
+        """
+        model, options = self.model(camera), self.scenario.filter
+        if options.backend != "simd":
+            return model
+        try:
+            return replace(model, processor=SimdLikelihood(options.simd, options.color, options.sampling))
+        except ValueError as error:
+            raise ScenarioError(f"{self.scenario.name}: filter.backend is simd, and {error}") from error
+
+    def single(self, camera: str) -> SirEstimator | ArrayEstimator | None:
+        """A camera's filter on its own, if it is asked for; in the image plane wholly on its processor.
+
+        Raises:
+            ScenarioError: The processor cannot do what the options ask for.
+        """
+        if not self.scenario.baselines.single:
+            return None
+        if self.scenario.filter.backend != "simd" or self.scenario.target.space != "image":
+            return SirEstimator(camera, "single", self.setup)
+        try:
+            return ArrayEstimator(camera, self.setup)
+        except ValueError as error:
+            raise ScenarioError(f"{self.scenario.name}: filter.backend is simd, and {error}") from error
 
     def smart_camera(self, name: str) -> SmartCamera:
         """A camera's node."""
         network, neighbors = self.scenario.network, self.links[name].neighbors
+        quantizer = network.payload.quantizer(self.scenario.seed, name)
         return SmartCamera(
-            self.model(name),
+            self.model_on_camera(name),
             self.setup,
-            Consensus(name, neighbors, network.consensus, network.iterations),
+            Consensus(name, neighbors, self.algorithm, network.iterations, quantizer),
             self.graph.names,
-            with_single=self.scenario.baselines.single,
+            self.single(name),
         )
 
     def central(self) -> Central:

@@ -25,6 +25,7 @@ class _Picture(ctypes.Structure):
         ("hue_bins", _int32),
         ("grey_chroma", _int32),
         ("grey_saturation", _int32),
+        ("full_saturation", _int32),
     )
 
 
@@ -61,13 +62,13 @@ class Coding:
     Attributes:
         tables: What blue, green and red add to it.
         hue_bins: If above 0, the index is the bin of the hue instead.
-        grey_chroma, grey_saturation: Which pixels have no hue; see `nodes.filtering.hue.hue_bins`.
+        grey: Which pixels have no hue: the chroma and the saturation below which they have none, and full
+            saturation; see `nodes.filtering.hue.hue_bins`.
     """
 
     tables: UInt16[np.ndarray, "3 256"]
     hue_bins: int = 0
-    grey_chroma: int = 0
-    grey_saturation: int = 0
+    grey: tuple[int, int, int] = (0, 0, 0)
 
     @cached_property
     def address(self) -> int:
@@ -194,7 +195,7 @@ def _run(
     samples, _kept = _samples(grid, kernel, book.part_heights)
     picture = _Picture(
         *(_address(image), image.strides[0], *image.shape[:2]),
-        *(coding.address, coding.hue_bins, coding.grey_chroma, coding.grey_saturation),
+        *(coding.address, coding.hue_bins, *coding.grey),
     )
     address = _address(found)
     failed = load_kernel().dcpf_count(

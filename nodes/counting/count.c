@@ -19,7 +19,7 @@ typedef struct {
     int32_t height, width;
     const uint16_t *index; /* three tables of 256: joint index = index[b] + index[256 + g] + index[512 + r], or */
     int32_t hue_bins;      /* if above 0, the bin of the hue, as nodes/filtering/color.py has it */
-    int32_t grey_chroma, grey_saturation;
+    int32_t grey_chroma, grey_saturation, full_saturation;
 } picture;
 
 typedef struct {
@@ -40,12 +40,12 @@ typedef struct {
 } sampling;
 
 /* Without branches, so that a row of pixels is done several at a time. */
-static inline int hue_bin(int b, int g, int r, int bins, int grey_chroma, int grey_saturation) {
+static inline int hue_bin(int b, int g, int r, int bins, int grey_chroma, int grey_saturation, int full) {
     int largest = b > g ? b : g, least = b < g ? b : g;
     largest = largest > r ? largest : r;
     least = least < r ? least : r;
     int chroma = largest - least, n = bins - 1;
-    int grey = (chroma < grey_chroma) | (grey_saturation * chroma < largest);
+    int grey = (chroma < grey_chroma) | (full * chroma < grey_saturation * largest);
     int hue = largest == r ? g - b : largest == g ? 2 * chroma + b - r : 4 * chroma + r - g;
     hue += hue < 0 ? 6 * chroma : 0;
     /* whole numbers below 2^24: the floor is exact */
@@ -56,9 +56,10 @@ static inline int hue_bin(int b, int g, int r, int bins, int grey_chroma, int gr
 static void index_row(const picture *p, const uint8_t *restrict bgr, int w, uint16_t *restrict joint) {
     const uint16_t *restrict blue = p->index, *restrict green = blue + 256, *restrict red = green + 256;
     const int bins = p->hue_bins, chroma = p->grey_chroma, saturation = p->grey_saturation;
+    const int full = p->full_saturation;
     if (bins)
         for (int x = 0; x < w; x++)
-            joint[x] = hue_bin(bgr[3 * x], bgr[3 * x + 1], bgr[3 * x + 2], bins, chroma, saturation);
+            joint[x] = hue_bin(bgr[3 * x], bgr[3 * x + 1], bgr[3 * x + 2], bins, chroma, saturation, full);
     else
         for (int x = 0; x < w; x++) joint[x] = blue[bgr[3 * x]] + green[bgr[3 * x + 1]] + red[bgr[3 * x + 2]];
 }

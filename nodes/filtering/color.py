@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 
 from network.options import Options
 from nodes.counting.compiled import Coding
-from nodes.filtering.hue import GREY_CHROMA, GREY_SATURATION, MAX_BINS, hue_bins
+from nodes.filtering.hue import FULL_SATURATION, GREY_CHROMA, GREY_SATURATION, MAX_BINS, hue_bins
 
 GAIN_GRID_PX = 24
 """Every 24th pixel of every 24th line is enough for a median."""
@@ -173,7 +173,7 @@ def coding(options: ColorOptions, gain: Float[np.ndarray, " 3"]) -> Coding:
 @lru_cache(maxsize=64)
 def _coding(options: ColorOptions, gain: bytes) -> Coding:
     if options.space == "hue":
-        return Coding(_NO_TABLES, options.n_bins, GREY_CHROMA, GREY_SATURATION)
+        return Coding(_NO_TABLES, options.n_bins, (GREY_CHROMA, GREY_SATURATION, FULL_SATURATION))
     tables = _tables(options, np.frombuffer(gain))
     if options.space == "rgb":
         tables = tables * _digits(options.bins_per_channel)

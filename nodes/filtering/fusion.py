@@ -76,6 +76,12 @@ def pack(result: LocalResult, options: FusionOptions) -> Float[np.ndarray, " K"]
     return np.concatenate([pack_symmetric(information.matrix), information.vector])
 
 
+def packed_size(n_states: int, options: FusionOptions) -> int:
+    """How many numbers `pack` gives, for D states."""
+    size = n_states if options.rule == "eq17" else n_states // 2
+    return (size * (size + 1) // 2 + size) * (2 if options.rule == "eq17" else 1)
+
+
 def _position_information(result: LocalResult, options: FusionOptions) -> Information:
     if options.rule == "net_information":
         return net_information(result.posterior.position(), result.predicted.position(), options.ridge)

@@ -35,6 +35,8 @@ from nodes.filtering.color import (
 from nodes.filtering.likelihood import LikelihoodOptions, background_constants, log_likelihoods
 from nodes.filtering.pattern import Pattern, coefficients, full_codebook, pattern_of, squared_distances
 from nodes.filtering.target import TargetOptions, project_boxes, visible_fraction
+from nodes.simd.likelihood import SimdLikelihood
+from nodes.simd.options import SimdOptions
 from nodes.threads import in_shares
 
 GOOD_SIGHT = 0.9
@@ -46,9 +48,12 @@ LEAST_BOXES = 8000
 class ObservationOptions(Options):
     """How a camera measures the target."""
 
-    backend: Literal["fast", "compiled"] = "fast"
+    backend: Literal["fast", "compiled", "simd"] = "fast"
     """What counts the colours of the particles' boxes: `fast`, NumPy and OpenCV; `compiled`, a kernel in C
-    that is built on first use. The counts are equal to the last one."""
+    that is built on first use; `simd`, the emulated processor array of a smart camera, in its own arithmetic.
+    The counts are equal to the last one."""
+    simd: SimdOptions = SimdOptions()
+    """The array, for the backend `simd`."""
     threads: int = Field(default=1, ge=1, le=64)
     """Threads of each filter, for likelihoods and resampling; the numbers are the same with any. Too few
     particles for so many threads are done by fewer."""
@@ -90,16 +95,23 @@ class ObservationModel:
         target: What it looks for.
         options: How it measures.
         gain: The first picture on a sparse grid; None before the first.
+        processor: The emulated array that measures, if one does.
     """
 
     camera: Camera
     target: TargetOptions
     options: ObservationOptions
     gain: GainReference | None = None
+    processor: SimdLikelihood | None = None
 
     def with_first(self, image: UInt8[np.ndarray, "H W 3"]) -> "ObservationModel":
         """The same model, with gains measured against this picture from now on."""
         return replace(self, gain=gain_reference(image))
+
+    @property
+    def off_array(self) -> "ObservationModel":
+        """The same model measured by this machine: for baselines, which no camera has to run."""
+        return replace(self, processor=None)
 
     def look(self, image: UInt8[np.ndarray, "H W 3"]) -> Picture:
         """Takes the gain of a picture, if the options ask for it."""
@@ -191,6 +203,8 @@ class ObservationModel:
     ) -> Float[np.ndarray, " N"]:
         """d² of each box to the reference, counted by the backend of the options, in its threads."""
         pattern = pattern_of(appearance, self.options.color)
+        if self.processor is not None:
+            return self._on_array(picture, boxes, pattern, self.processor)
         if self.options.threads == 1:
             return self._share_distances(picture, boxes, pattern)
         distances = np.empty(len(boxes))
@@ -212,6 +226,20 @@ class ObservationModel:
             return distances_compiled(image, code, boxes, pattern.compiled, sampling.grid, sampling.kernel)
         counts, pixels = self._count(picture, boxes, pattern.book)
         return squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
+
+    def _on_array(
+        self,
+        picture: Picture,
+        boxes: Float[np.ndarray, "N 4"],
+        pattern: Pattern,
+        processor: SimdLikelihood,
+    ) -> Float[np.ndarray, " N"]:
+        size_px = self.camera.width_px, self.camera.height_px
+        # The array bins the whole picture; what nobody reads need not be emulated.
+        left, top, right, bottom = locate(boxes, size_px, pattern.book, self.options.sampling).region
+        bins = quantize(picture.image[top:bottom, left:right], self.options.color, picture.gain)
+        offset = np.array([left, top, left, top])
+        return processor.measure(bins, boxes - offset, pattern, size_px).squared_distance
 
     def _histograms(self, picture: Picture, boxes: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N P C B"]:
         color = self.options.color

@@ -50,7 +50,7 @@ def looping_like(model: ObservationModel, picture: Picture, box: Float[np.ndarra
     left, top, right, bottom = np.floor(box + 0.5).astype(int).tolist()
     color = model.options.color
     reference = histogram(channels(picture.image, color)[top:bottom, left:right], color)
-    return LoopModel(model.camera, model.target, model.options, model.gain, reference)
+    return LoopModel(model.camera, model.target, model.options, model.gain, reference=reference)
 
 
 def channels(image: UInt8[np.ndarray, "H W 3"], color: ColorOptions) -> UInt8[np.ndarray, "H W *C"]:

@@ -18,6 +18,7 @@ from nodes.filtering.particles import Particles
 from nodes.filtering.sir import View, sir_step
 from nodes.filtering.target import project_boxes
 from nodes.setup import TrackingSetup
+from nodes.simd.likelihood import SimdLikelihood
 from sim.assembly import Assembly
 from sim.benchmarks.loop import looping_like
 from sim.scenario.loading import load_scenario
@@ -121,4 +122,6 @@ def backends() -> tuple[str, ...]:
 
 def _with_backend(model: ObservationModel, name: str) -> ObservationModel:
     sampling = SamplingOptions(grid=GRIDS.get(name))
-    return replace(model, options=model.options.model_copy(update={"backend": name, "sampling": sampling}))
+    options = model.options.model_copy(update={"backend": name, "sampling": sampling})
+    processor = SimdLikelihood(options.simd, options.color, sampling) if name == "simd" else None
+    return replace(model, options=options, processor=processor)

@@ -11,10 +11,13 @@ from rich.logging import RichHandler
 from sim.commands.bench import bench
 from sim.commands.clip import clip
 from sim.commands.compare import compare
+from sim.commands.consensus import consensus
 from sim.commands.guard import guarded
 from sim.commands.inspect import check, footage, schema
 from sim.commands.node import central, node
+from sim.commands.replay import replay
 from sim.commands.run import run
+from sim.commands.simd import simd
 from sim.commands.watch import watch
 
 app = typer.Typer(
@@ -25,7 +28,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (run, watch, compare, clip, node, central, check, schema, footage):
+for command in (run, watch, replay, compare, consensus, clip, simd, node, central, check, schema, footage):
     app.command()(guarded(command))
 app.add_typer(bench)
 

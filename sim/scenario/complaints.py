@@ -121,7 +121,11 @@ def _nearest_form(findings: list[_Finding]) -> list[_Finding]:
     That is the form with the fewest errors among those that found the right kind of value, if any did.
     """
     forms = [list(group) for _, group in groupby(findings, key=lambda finding: finding.form)]
-    inside = [form for form in forms if all(finding.at != finding.union_at for finding in form)]
+    inside = [
+        form
+        for form in forms
+        if all(finding.at != finding.union_at or finding.kind.startswith("union_tag") for finding in form)
+    ]
     return min(inside, key=len) if inside else [finding for form in forms for finding in form]
 
 

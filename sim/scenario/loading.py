@@ -11,7 +11,8 @@ from nodes.camera import Camera, look_at
 from nodes.sources import SourceError, VideoSource
 from sim.footage import FootageError, locate
 from sim.scenario.complaints import validate
-from sim.scenario.document import merge_defaults, read_document
+from sim.scenario.document import Document, merge_defaults, read_document
+from sim.scenario.edges import with_edges
 from sim.scenario.model import CameraOptions, Scenario
 from sim.scenario.parsing import ScenarioError
 from sim.scenario.presets import preset_defaults
@@ -32,13 +33,23 @@ def load_scenario(path: Path, overrides: Iterable[tuple[str, str]] = ()) -> Scen
     Raises:
         ScenarioError: The file, or one that it names, is not as it must be.
     """
-    document = read_document(path)
+    return resolve(read_document(path), overrides)
+
+
+def resolve(document: Document, overrides: Iterable[tuple[str, str]] = ()) -> Scenario:
+    """Resolves a scenario that has been read, as `load_scenario` does.
+
+    Raises:
+        ScenarioError: It, or a file that it names, is not as it must be.
+    """
+    path = document.path
     for key, value in overrides:
         document = document.with_value(key, value)
     document = merge_defaults(document, preset_defaults(document.data))
     scenario = validate(document, Scenario)
     try:
-        return _resolve(scenario, path.parent)
+        resolved = _resolve(scenario, path.parent)
+        return with_edges(resolved, cameras_of(resolved), path.parent)
     except (CalibrationError, FootageError, SourceError) as error:
         raise ScenarioError(f"{path}: {error}") from None
     except ValueError as error:

@@ -8,10 +8,12 @@ from pydantic import AfterValidator, Field, PositiveInt, model_validator
 from network.graph import Edge, Graph, complete, grid, path, ring, star
 from network.keys import check_name
 from network.options import Options
+from network.quantization import PayloadOptions
 from network.weights import ConsensusOptions
 from nodes.filtering.fusion import FusionOptions
 from nodes.filtering.target import TargetOptions
 from nodes.setup import FilterOptions
+from sim.scenario.graphs import DescribedGraph
 from sim.scenario.presets import PresetName
 from sim.world.world import WorldOptions
 
@@ -92,18 +94,30 @@ class FootageOptions(Options):
 class NetworkOptions(Options):
     """Who talks to whom, and how they agree."""
 
-    graph: Literal["ring", "path", "star", "complete", "grid"] | tuple[Edge, ...] = "ring"
-    """The communication graph over the cameras in their order, or a list of pairs of their names."""
+    graph: Literal["ring", "path", "star", "complete", "grid"] | tuple[Edge, ...] | DescribedGraph = "ring"
+    """The communication graph: a shape over the cameras in their order, a list of pairs of their names, or
+    a graph by its `kind`: `geometric`, `watts_strogatz`, `overlap` or `file`."""
     consensus: ConsensusOptions
     """The averaging."""
     iterations: int = Field(default=12, ge=0, le=1000)
     """Rounds of consensus in a frame, t."""
+    payload: PayloadOptions = PayloadOptions()
+    """How many bits a number of the rounds has."""
     deadline_s: float = Field(default=5.0, gt=0)
     """In lockstep, the time that a frame waits for a neighbour before it goes on without it, in s."""
     router: str = "tcp/127.0.0.1:7447"
     """Zenoh endpoint at which the run's router serves the outside."""
     endpoints: Mapping[Name, str] = Field(default={})
     """Zenoh endpoints at which nodes listen when they are started by hand; the others take loopback ports."""
+
+    @model_validator(mode="after")
+    def _weights_fit_the_payload(self) -> "NetworkOptions":
+        if self.consensus.algorithm == "ratio" and self.payload.encoding == "float16":
+            raise ValueError(
+                "network.payload.encoding is float16, in which ratio consensus' weights vanish beside large"
+                " numbers: take float32"
+            )
+        return self
 
 
 class CentralOptions(Options):
@@ -220,18 +234,34 @@ class Scenario(Options):
 
     @model_validator(mode="after")
     def _network(self) -> "Scenario":
-        graph = self.graph
-        graph.require_connected()
-        self.network.consensus.require_convergence(graph.max_degree)
+        if isinstance(self.network.graph, str | tuple):
+            self.require_convergence()
         return self
+
+    def require_convergence(self) -> None:
+        """Checks that consensus converges on the graph.
+
+        Raises:
+            ValueError: The graph falls into parts, or the averaging does not suit it.
+        """
+        graph, network = self.graph, self.network
+        graph.require_connected()
+        network.consensus.require_convergence(graph.max_degree)
+        network.consensus.tuned(graph, network.iterations)
 
     @property
     def graph(self) -> Graph:
-        """The communication graph over the cameras."""
-        names = [camera.name for camera in self.cameras]
-        if isinstance(self.network.graph, str):
-            return GRAPHS[self.network.graph](names)
-        return Graph.from_edges(names, self.network.graph)
+        """The communication graph over the cameras.
+
+        Raises:
+            ValueError: It is described and not yet worked out, which reading the scenario does.
+        """
+        names, graph = [camera.name for camera in self.cameras], self.network.graph
+        if isinstance(graph, str):
+            return GRAPHS[graph](names)
+        if isinstance(graph, tuple):
+            return Graph.from_edges(names, graph)
+        raise ValueError(f"the {graph.kind} graph of {self.name} is not worked out: load the scenario")
 
     @property
     def n_processes(self) -> int:

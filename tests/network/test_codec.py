@@ -23,12 +23,15 @@ from network.messages import (
     TruthMessage,
     Visibility,
 )
+from network.quantization import Quantizer
 
 RUN = "scene1"
 finite = st.floats(-1e150, 1e150)
 payloads = hnp.arrays(float, st.integers(0, 40), elements=finite)
 
 CONSENSUS = ConsensusMessage("C1", 7, 3, 2, np.array([1.5, -2.0, 1e-300]))
+SINGLE = ConsensusMessage("C1", 7, 3, 2, np.array([1.5, -2.0, 0.25]), "float32")
+HALF = ConsensusMessage("C1", 7, 3, 2, np.array([1.5 * 2.0**30, -(2.0**31), 0.0]), "float16")
 PIXELS = PixelsMessage("C1", 7, np.arange(4 * 5 * 3, dtype=np.uint8).reshape(4, 5, 3))
 CONFIRM = ConfirmMessage("central", 7)
 ESTIMATE = EstimateMessage(
@@ -59,6 +62,56 @@ def test_consensus_layout_as_documented():
     data = codec.encode(RUN, CONSENSUS)
     run, sender = (blake2b(name, digest_size=size).digest() for name, size in ((b"scene1", 8), (b"C1", 4)))
     assert data == struct.pack("<BBHHH8s4sI3d", 1, 1, 3, 3, 2, run, sender, 7, 1.5, -2.0, 1e-300)
+
+
+def test_rounded_payloads_layout_as_documented():
+    run, sender = (blake2b(name, digest_size=size).digest() for name, size in ((b"scene1", 8), (b"C1", 4)))
+    header = (3, 3, 2, run, sender, 7)
+    assert codec.encode(RUN, SINGLE) == struct.pack("<BBHHH8s4sI3f", 1, 0x11, *header, 1.5, -2.0, 0.25)
+    # the largest, 2^31, is written as 2^14
+    assert codec.encode(RUN, HALF) == struct.pack(
+        "<BBHHH8s4sIh3e", 1, 0x21, *header, 17, 1.5 * 2.0**13, -(2.0**14), 0.0
+    )
+
+
+@pytest.mark.parametrize("encoding", ["float32", "float16"])
+@settings(deadline=None)
+@given(hnp.arrays(float, st.integers(0, 9), elements=st.floats(-1e37, 1e37)), st.integers(0, 2**32))
+def test_rounded_payloads_round_trip_to_the_last_bit(encoding, payload, seed):
+    for rng in (None, np.random.default_rng(seed)):
+        sent = Quantizer(encoding, rng)(payload)
+        message = ConsensusMessage("C1", 7, 3, 2, sent, encoding)
+        read = codec.decode(ConsensusMessage, RUN, "C1", codec.encode(RUN, message))
+        assert read.encoding == encoding
+        np.testing.assert_array_equal(read.payload, sent)
+        assert not read.payload.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("code", "message", "reason"),
+    [
+        (0x31, SINGLE, "kind"),  # an encoding that there is not
+        (0x11, CONSENSUS, "length"),
+        (0x21, SINGLE, "length"),
+        (0x01, HALF, "length"),
+        (0x12, PIXELS, "kind"),  # pictures have none
+        (0x13, CONFIRM, "kind"),
+    ],
+)
+def test_wrong_encodings_are_refused(code, message, reason):
+    data = bytearray(codec.encode(RUN, message))
+    data[1] = code
+    with pytest.raises(RefusedMessage) as refusal:
+        codec.decode(type(message), RUN, message.sender, bytes(data))
+    assert refusal.value.reason == reason
+
+
+@pytest.mark.parametrize("exponent", [2**15 - 1, 600])
+def test_half_precision_beyond_all_numbers_is_refused(exponent):
+    data = bytearray(codec.encode(RUN, HALF))
+    data[24:26] = struct.pack("<h", exponent)
+    with pytest.raises(RefusedMessage, match="not-finite"):
+        codec.decode(ConsensusMessage, RUN, "C1", bytes(data))
 
 
 def test_pixels_round_trip_without_a_copy():
@@ -166,7 +219,7 @@ READERS = [
     *((kind, lambda data, kind=kind: codec.decode_public(kind, data))
       for kind in (EstimateMessage, StatusMessage, TruthMessage, ControlMessage)),
 ]  # fmt: skip
-SAMPLES = [codec.encode(RUN, message) for message in (CONSENSUS, PIXELS, CONFIRM, *PUBLIC)]
+SAMPLES = [codec.encode(RUN, message) for message in (CONSENSUS, SINGLE, HALF, PIXELS, CONFIRM, *PUBLIC)]
 
 
 def mutated(data):

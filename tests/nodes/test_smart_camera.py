@@ -7,6 +7,7 @@ from network.consensus import Consensus
 from network.graph import ring
 from network.messages import ConsensusMessage, EstimateMessage
 from network.weights import MetropolisWeights
+from nodes.estimator import SirEstimator
 from nodes.filtering.fusion import FusionOptions
 from nodes.smart_camera import SmartCamera
 
@@ -26,7 +27,7 @@ class Bench:
                 room.setup,
                 Consensus(name, net.neighbors(name), MetropolisWeights(), N_ROUNDS),
                 NAMES,
-                with_single=with_single,
+                SirEstimator(name, "single", room.setup) if with_single else None,
             )
             for name in NAMES
         }

@@ -72,6 +72,24 @@ MISTAKES = {
     "no endpoint": (["watch", "--connect", "x"], "nothing answers at x"),
     "nothing to compare": (["compare"], "Missing argument"),
     "one of two is missing": (["compare", "small.yaml", "none.yaml"], "none.yaml: there is no such file"),
+    "no such algorithm": (
+        ["consensus", "small.yaml", "--algorithm", "gossip"],
+        "there is no algorithm gossip: choose among constant, metropolis",
+    ),
+    "no such graph": (["consensus", "small.yaml", "--graph", "rings"], "network.graph must be 'ring'"),
+    "a graph on which the paper's epsilon diverges": (
+        [
+            "consensus",
+            "small.yaml",
+            "--graph",
+            "star",
+            "--set",
+            "preset=paper",
+            "--set",
+            "network.consensus.epsilon=0.34",
+        ],
+        "take it below 1/3 = 0.333",
+    ),
     "a negative seed": (["run", "small.yaml", "--seed", "-1"], "--seed"),
     "no command": (["frobnicate"], "No such command"),
 }
@@ -148,9 +166,8 @@ def test_compare_writes_figures_and_plots(dcpf, small, tmp_path):
     assert report["runs"] == 2
     assert [each["seed"] for each in report["summaries"]] == [0, 1]
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        "comparison.json",
-        "comparison.svg",
-        "comparison.png",
+        *("comparison.json", "comparison.svg", "comparison.png", "cells.jsonl", "summary.csv", "timing.json"),
+        "parts",
     }
 
 
@@ -224,3 +241,28 @@ def test_bench_names_the_scenario_that_is_not_there(dcpf, tmp_path):
     result = dcpf("bench", "filter", "--scenarios", tmp_path)
     assert result.exit_code == 2
     assert "wica.yaml: there is no such file" in result.stderr
+
+
+@pytest.mark.usefixtures("small")
+def test_consensus_tells_how_each_algorithm_converges(dcpf, tmp_path):
+    result = dcpf("consensus", "small.yaml", "--graph", "path", "--rounds", "12", "--out", "c", "--json")
+    assert result.exit_code == 0
+    told = json.loads(result.stdout)
+    assert told["graph"]["edges"] == [["A", "B"], ["B", "C"], ["C", "D"]]
+    assert list(told["algorithms"]) == ["constant", "metropolis", "best_constant", "chebyshev", "finite_time",
+                                        "ratio", "event_triggered"]  # fmt: skip
+    for each in told["algorithms"].values():
+        assert len(each["residual"]) == 12
+        assert {"residual", "rate", "theory", "bytes_per_round"} <= each.keys()
+    assert told["algorithms"]["chebyshev"]["residual"][-1] == pytest.approx(5.1e-5, rel=0.01)
+    assert json.loads((tmp_path / "c/consensus.json").read_text()) == told
+    assert (tmp_path / "c/consensus.png").stat().st_size > 10_000
+
+
+@pytest.mark.usefixtures("small")
+def test_consensus_prints_a_table_of_what_was_asked_for(dcpf):
+    result = dcpf("consensus", "small.yaml", "--algorithm", "ratio", "--algorithm", "chebyshev", "--out", "c")
+    assert result.exit_code == 0
+    assert "ring, 4 nodes, 3 rounds: 4 links, largest degree 2" in result.stdout
+    assert result.stdout.index("ratio") < result.stdout.index("chebyshev")
+    assert "metropolis" not in result.stdout

@@ -49,7 +49,7 @@ def hue_bin(red, green, blue, n):
     """The rule of `hue_bins`, one pixel at a time, in Python's integers."""
     largest, smallest = max(red, green, blue), min(red, green, blue)
     chroma = largest - smallest
-    if chroma < 16 or 8 * chroma < largest:
+    if chroma < 16 or 1023 * chroma < 128 * largest:
         return n - 1
     if largest == red:
         hue = green - blue

@@ -1,0 +1,46 @@
+"""The linear iteration whose weights follow from the two degrees alone, which the messages carry."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+from network.averaging.algorithm import Algorithm, AlgorithmOptions, State, Vector
+from network.graph import Graph
+from network.messages import ConsensusMessage
+
+
+class Weights(AlgorithmOptions):
+    """A rule for w_lj in a_l(t) = a_l(t-1) + Σ_j w_lj (a_j(t-1) - a_l(t-1)) (Eq. 3 of Jing & Chen)."""
+
+    uses_late: ClassVar[bool] = False
+
+    @abstractmethod
+    def weight(self, own_degree: int, neighbor_degree: int) -> float:
+        """The weight w_lj between a node and its neighbour, from how many neighbours each has.
+
+        It must not change when the two are swapped: only then do the rounds preserve the average.
+        """
+
+    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:  # noqa: ARG002 - degrees are all it needs
+        """The rule itself: it needs to know nothing of the graph."""
+        return self
+
+    def begin(self, value: Vector, last: State | None) -> State:  # noqa: ARG002 - nothing is kept
+        """The node's own value."""
+        return State(value)
+
+    def payload(self, state: State, degree: int) -> Vector:  # noqa: ARG002 - the same for everybody
+        """The value."""
+        return state.value
+
+    def fits(self, state: State, message: ConsensusMessage) -> bool:
+        """Whether it is as long as the node's own."""
+        return message.payload.shape == state.value.shape
+
+    def step(self, state: State, own: ConsensusMessage, received: Sequence[ConsensusMessage]) -> State:
+        """A step towards every neighbour."""
+        value = state.value.copy()
+        for message in received:
+            # a_l(t) = a_l(t-1) + Σ_j w_lj (a_j(t-1) - a_l(t-1))
+            value += self.weight(own.degree, message.degree) * (message.payload - own.payload)
+        return State(value)

@@ -1,0 +1,117 @@
+"""All nodes at once: the rounds as products with a sparse matrix, nothing lost and everybody there.
+
+The theory that the state machines are held against, and the way to average over many thousand nodes in one
+process. Rows are nodes in the graph's order. It needs SciPy, which node processes do not import.
+
+Residuals are ||X(t) - mean|| / ||X(0) - mean||, Frobenius norms over nodes and numbers; the worst over all
+starts is the largest singular value of the rounds' matrix on vectors that sum to zero. Rates are what is left
+of the residual from one round to the next, in the limit.
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from jaxtyping import Float
+from scipy import sparse
+
+from network.averaging.algorithm import metropolis_weight
+from network.averaging.chebyshev import next_relaxation
+from network.graph import Graph
+from network.spectrum import Spectrum
+
+Rounds = Iterator[Float[np.ndarray, "C K"]]
+"""The values before the first round, after it, after the second, without end."""
+
+
+def laplacian(graph: Graph, weight: Callable[[int, int], float] = lambda *_: 1.0) -> sparse.csr_array:
+    """The Laplacian of a graph whose edges are weighted by the degrees at their ends.
+
+    Args:
+        graph: The graph.
+        weight: An edge's weight, from the degrees at its ends.
+    """
+    row = {name: index for index, name in enumerate(graph.names)}
+    degrees = [graph.degree(name) for name in graph.names]
+    edges = np.array([(row[a], row[b]) for a, b in sorted(graph.edges)], dtype=int).reshape(-1, 2)
+    weights = np.array([weight(degrees[i], degrees[j]) for i, j in edges])
+    n = len(row)
+    across = sparse.coo_array((weights, edges.T), shape=(n, n)).tocsr()
+    across = across + across.T
+    return sparse.csr_array(sparse.diags_array(across.sum(axis=1)) - across)
+
+
+def metropolis_laplacian(graph: Graph) -> sparse.csr_array:
+    """I - W of the Metropolis weights."""
+    return laplacian(graph, metropolis_weight)
+
+
+def linear(L: sparse.csr_array, values: Float[np.ndarray, "C K"], step: float = 1.0) -> Rounds:
+    """X(t) = (I - εL) X(t-1): constant weights, best constant weights; with I - W and ε = 1, Metropolis."""
+    while True:
+        yield values
+        values = values - step * (L @ values)
+
+
+def chebyshev(L: sparse.csr_array, values: Float[np.ndarray, "C K"], spectrum: Spectrum) -> Rounds:
+    """X(t) = ω (X(t-1) - ε L X(t-1)) + (1 - ω) X(t-2)."""
+    before, omega = values, 0.0
+    while True:
+        yield values
+        omega = next_relaxation(omega, spectrum.contraction)
+        values, before = omega * (values - spectrum.step * (L @ values)) + (1 - omega) * before, values
+
+
+def finite_time(
+    L: sparse.csr_array, values: Float[np.ndarray, "C K"], roots: Float[np.ndarray, " R"]
+) -> Rounds:
+    """X(k) = (I - L/λ_k) X(k-1) as long as there are roots; what follows is the average already."""
+    for root in roots:
+        yield values
+        values = values - (L @ values) / root
+    while True:
+        yield values
+
+
+def ratio(L: sparse.csr_array, values: Float[np.ndarray, "C K"]) -> Rounds:
+    """[Y Z](t) = P [Y Z](t-1), X = Y / Z, with equal shares: P = I - L (I + D)⁻¹ on degrees D."""
+    mass = np.column_stack([values, np.ones(len(values))])
+    shares = 1 / (1 + L.diagonal()[:, None])
+    while True:
+        yield mass[:, :-1] / mass[:, -1:]
+        mass = mass - L @ (shares * mass)
+
+
+def linear_rate(L: sparse.csr_array, step: float = 1.0) -> float:
+    """The largest |1 - ελ| over the non-zero eigenvalues λ of L."""
+    eigenvalues = np.linalg.eigvalsh(L.toarray())[1:]
+    return float(np.abs(1 - step * eigenvalues).max(initial=0.0))
+
+
+def chebyshev_rate(spectrum: Spectrum) -> float:
+    """(1 - √(1 - ρ²)) / ρ: the limit of T_t(1/ρ) / T_t+1(1/ρ)."""
+    rho = spectrum.contraction
+    return (1 - np.sqrt(1 - rho**2)) / rho if rho else 0.0
+
+
+def ratio_rate(L: sparse.csr_array) -> float:
+    """The second largest |eigenvalue| of P = I - L (I + D)⁻¹."""
+    # similar to a symmetric matrix, by the roots of the shares
+    root = np.sqrt(1 / (1 + L.diagonal()))
+    eigenvalues = np.linalg.eigvalsh(root[:, None] * L.toarray() * root)[1:]
+    return float(np.abs(1 - eigenvalues).max(initial=0.0))
+
+
+def residual(values: Float[np.ndarray, "C K"], start: Float[np.ndarray, "C K"]) -> float:
+    """||X(t) - mean|| / ||X(0) - mean||; 0 where the start has no error."""
+    mean = start.mean(axis=0)
+    error = float(np.linalg.norm(start - mean))
+    return float(np.linalg.norm(values - mean)) / error if error else 0.0
+
+
+def worst_residual(values: Float[np.ndarray, "C C"]) -> float:
+    """The largest residual over all starts.
+
+    Args:
+        values: What the rounds make of the unit vectors: the identity matrix at the start.
+    """
+    return float(np.linalg.norm(values - 1 / len(values), 2))

@@ -1,0 +1,141 @@
+"""The lanes of the array: words, loops and counts, under the instructions."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Int, Num
+
+from nodes.simd.cost import Cost
+from nodes.simd.loops import Loop
+from nodes.simd.memory import TEMPORARY, LineMemory, Word
+from nodes.simd.options import SimdOptions
+
+Lanes = Num[np.ndarray, "..."]
+Flag = Bool[np.ndarray, "..."]
+Scalar = int | float
+"""A number that the control processor knows: whole in fixed point."""
+Operand = Word | int | float | np.number | Lanes
+"""A word, or an immediate value (one for each iteration of a loop that runs all at once)."""
+
+
+class LaneMachine:
+    """P lanes with their line memory, the control processor's loops, and counts by step.
+
+    Args:
+        options: The processor.
+        batching: Whether loops run all iterations at once; the words and the counts are the same either way.
+    """
+
+    def __init__(self, options: SimdOptions, *, batching: bool = True) -> None:
+        self.options = options
+        self.n = options.processing_elements
+        self.line_memory = LineMemory(options.words)
+        self.costs: dict[str, Cost] = {}
+        self._batching = batching
+        self._loop: Loop | None = None
+        self._cost = Cost()
+
+    # Counts
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[Cost]:
+        """Counts what is done inside under a name."""
+        before, self._cost = self._cost, self.costs.setdefault(name, Cost())
+        try:
+            yield self._cost
+        finally:
+            self._cost = before
+
+    def _count(self, **instructions: int) -> None:
+        times = self._loop.n if self._loop else 1
+        for kind, n in instructions.items():
+            self._cost.instructions[kind] += n * times
+
+    # Line memory
+
+    def word(
+        self, owner: str = TEMPORARY, n_words: int = 1, *, signed: bool = False, real: bool = False
+    ) -> Word:
+        """Allocates an integer, or a real number that the chip would hold in so many words."""
+        return self._allocate(owner, n_words, signed=signed, real=real)
+
+    def number(self, owner: str = TEMPORARY, n_words: int | None = None, *, signed: bool = False) -> Word:
+        """Allocates a number of the chosen arithmetic: fixed point, or real."""
+        real = self.options.arithmetic == "float"
+        return self._allocate(owner, n_words or self.options.number_words, signed=signed, real=real)
+
+    def like(self, word: Word) -> Word:
+        """Allocates a temporary variable of the same kind as another word."""
+        return self._allocate(TEMPORARY, word.n_words, signed=word.signed, real=word.real)
+
+    def _allocate(self, owner: str, n_words: int, *, signed: bool, real: bool) -> Word:
+        self.line_memory.allocate(owner, n_words)
+        return Word(owner, n_words, n_words * self.options.bits, signed=signed, real=real, lanes=self.n)
+
+    def free(self, *words: Word) -> None:
+        """Gives words back."""
+        for word in words:
+            self.line_memory.free(word.owner, word.n_words)
+
+    @contextmanager
+    def using(self, *words: Word) -> Iterator[tuple[Word, ...]]:
+        """Frees words at the end of a block."""
+        try:
+            yield words
+        finally:
+            self.free(*words)
+
+    def _value(self, operand: Operand) -> Any:
+        if not isinstance(operand, Word):
+            # as a Python number, a scalar leaves the lanes as narrow as they are
+            return operand.item() if isinstance(operand, np.generic) else operand
+        if self._loop:
+            self._loop.read(operand)
+        return operand.value
+
+    def _store(self, target: Word, value: Any, when: Flag | None) -> None:
+        if when is not None:
+            old = self._value(target)
+            value = _chosen(when, value, old)
+        if self._loop:
+            self._loop.write(target)
+        if np.ndim(value) == 0:
+            value = np.full(self.n, value, target.dtype)
+        elif value.shape[-1] != self.n:
+            value = np.broadcast_to(value, (*value.shape[:-1], self.n))
+        target.value = value
+
+    # Loops
+
+    def repeat(self, n: int) -> Iterator[int | Int[np.ndarray, "n 1"]]:
+        """A loop of the control processor; yields its counter.
+
+        With batching, all iterations run at once on a leading axis. What one leaves to the next must go
+        through `accumulate`, `shift` or `keep`.
+
+        Raises:
+            ValueError: An iteration reads what the one before has written.
+        """
+        if not self._batching:
+            yield from range(n)
+            return
+        if self._loop:
+            raise ValueError("loops that run all iterations at once do not nest: use range for the inner one")
+        self._loop = Loop(n)
+        try:
+            yield np.arange(n, dtype=np.int32)[:, None]
+            self._loop.finish()
+        finally:
+            self._loop = None
+
+
+def _chosen(when: Flag, value: Any, old: Lanes) -> Lanes:
+    """The value where the flag is set, else the old one; np.where is slow on long arrays of integers."""
+    if old.dtype.kind == "f":
+        return np.where(when, value, old)
+    # old ⊕ ((old ⊕ value) ∧ mask)
+    changed = (old ^ value) & np.negative(when.view(np.int8), dtype=old.dtype)
+    changed ^= old
+    return changed

@@ -1,0 +1,1 @@
+"""The programs of the tracker, written in the array's primitives alone."""
