@@ -51,10 +51,19 @@ def read_scenario(
     given = {"seed": seed, "frames": frames, "pace": pace, "name": name}
     chosen = [(key, str(value)) for key, value in given.items() if value is not None]
     scenario = load_scenario(path, [*split_overrides(overrides), *chosen])
-    if scenario.filter.backend == "compiled":
-        load_kernel()
+    require_backend(scenario.filter)
     _say_of_threads(scenario.filter)
     return scenario
+
+
+def require_backend(options: FilterOptions) -> None:
+    """Makes sure that this machine has what the filter is to run on, before anything starts.
+
+    Raises:
+        KernelError: The compiled kernel cannot be had.
+    """
+    if options.backend == "compiled":
+        load_kernel()
 
 
 def _say_of_threads(options: FilterOptions) -> None:
