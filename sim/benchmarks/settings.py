@@ -88,7 +88,8 @@ def setting(letter: str, folder: Path, overrides: Sequence[tuple[str, str]] = ()
         ScenarioError: A scenario is not there, or the camera does not see the target at the start.
     """
     path = folder / f"{SETTINGS[letter]}.yaml"
-    fixed = [("preset", "paper"), ("filter.sampling.grid", "null"), ("frames", str(FRAME + 1))]
+    measured = [("filter.backend", "fast"), ("filter.sampling.grid", "null")]
+    fixed = [("preset", "paper"), ("frames", str(FRAME + 1)), *measured]
     assembly = Assembly(load_scenario(path, [*fixed, *overrides]))
     setup, camera = assembly.setup, next(iter(assembly.cameras))
     model, source = assembly.model(camera), assembly.source(camera)
