@@ -19,7 +19,6 @@ from sim.commands.shared import (
     Overrides,
     length_text,
     progress_bar,
-    require_backend,
     split_overrides,
 )
 from sim.experiments.found.claims import Verdict
@@ -72,6 +71,7 @@ def compare(
     # What computes and draws takes its time to import; --help does not wait for it.
     import joblib
 
+    from sim.assembly import Assembly
     from sim.experiments.computing.engine import compute_here, compute_on_cluster
     from sim.experiments.computing.store import Store
     from sim.experiments.found.claims import judge
@@ -82,7 +82,7 @@ def compare(
     given = [*split_overrides(overrides), *([("frames", str(frames))] if frames else [])]
     plan = _plan(scenarios, sweeps or [], given, runs)
     for group in plan.groups:
-        require_backend(group.scenario_run.filter)
+        Assembly(group.scenario_run).require_backend()
     results = out or Path("runs") / f"{plan.options.name}-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
     store = Store(results / "parts")
     engine = (

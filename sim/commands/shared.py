@@ -9,7 +9,6 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from nodes.counting.build import load_kernel
 from nodes.filtering.observation import LEAST_BOXES
 from nodes.setup import FilterOptions
 from nodes.threads import n_shares
@@ -51,19 +50,17 @@ def read_scenario(
     given = {"seed": seed, "frames": frames, "pace": pace, "name": name}
     chosen = [(key, str(value)) for key, value in given.items() if value is not None]
     scenario = load_scenario(path, [*split_overrides(overrides), *chosen])
-    require_backend(scenario.filter)
+    _require_backend(scenario)
     _say_of_threads(scenario.filter)
     return scenario
 
 
-def require_backend(options: FilterOptions) -> None:
-    """Makes sure that this machine has what the filter is to run on, before anything starts.
+def _require_backend(scenario: Scenario) -> None:
+    """Fails before anything starts where this machine, or the emulated one, cannot run the filter."""
+    if scenario.filter.backend != "fast":
+        from sim.assembly import Assembly
 
-    Raises:
-        KernelError: The compiled kernel cannot be had.
-    """
-    if options.backend == "compiled":
-        load_kernel()
+        Assembly(scenario).require_backend()
 
 
 def _say_of_threads(options: FilterOptions) -> None:
