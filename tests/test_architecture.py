@@ -16,7 +16,7 @@ OUTSIDE_WORLD = {
 """What would make the same arguments give another result, or has a life of its own."""
 
 PURE = (
-    *sorted((ROOT / "nodes/filtering").glob("*.py")),
+    *sorted((ROOT / "nodes/filtering").rglob("*.py")),
     *sorted((ROOT / "network/averaging").glob("*.py")),
     *(
         ROOT / "nodes" / name
