@@ -16,6 +16,7 @@ from sim.commands.inspect import check, footage, schema
 from sim.commands.node import central, node
 from sim.commands.run import run
 from sim.commands.simd import simd
+from sim.commands.simulate import simulate
 from sim.commands.watch import watch
 
 app = typer.Typer(
@@ -26,7 +27,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (run, watch, compare, consensus, clip, simd, node, central, check, schema, footage):
+for command in (run, watch, compare, consensus, simulate, clip, simd, node, central, check, schema, footage):
     app.command()(guarded(command))
 
 

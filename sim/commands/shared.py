@@ -37,6 +37,7 @@ def read_scenario(
     frames: int | None = None,
     pace: str | None = None,
     name: str | None = None,
+    rendered: bool = True,
 ) -> Scenario:
     """A scenario with what the command line says instead.
 
@@ -45,7 +46,7 @@ def read_scenario(
     """
     given = {"seed": seed, "frames": frames, "pace": pace, "name": name}
     chosen = [(key, str(value)) for key, value in given.items() if value is not None]
-    return load_scenario(path, [*split_overrides(overrides), *chosen])
+    return load_scenario(path, [*split_overrides(overrides), *chosen], rendered=rendered)
 
 
 def split_overrides(overrides: list[str] | None) -> list[tuple[str, str]]:

@@ -1,9 +1,10 @@
 """The scenario: what a file can say. It composes the options that stand beside the things they configure."""
 
+from collections import Counter
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Field, PositiveInt, model_validator
+from pydantic import AfterValidator, Field, PositiveInt, ValidationInfo, model_validator
 
 from network.graph import Edge, Graph, complete, grid, path, ring, star
 from network.keys import check_name
@@ -14,7 +15,9 @@ from nodes.filtering.fusion import FusionOptions
 from nodes.filtering.target import TargetOptions
 from nodes.setup import FilterOptions
 from sim.scenario.graphs import DescribedGraph
+from sim.scenario.layout import CameraLayout
 from sim.scenario.presets import PresetName
+from sim.simulation.sensor import SensorOptions
 from sim.world.world import WorldOptions
 
 Name = Annotated[str, AfterValidator(check_name)]
@@ -66,6 +69,35 @@ class CameraOptions(Options):
         if (ways[0] or ways[1]) and self.size_px is None:
             raise ValueError(f"camera {self.name} needs size_px: add it, such as size_px: [640, 480]")
         return self
+
+
+def _hung(
+    cameras: tuple[CameraOptions, ...] | CameraLayout, info: ValidationInfo
+) -> tuple[CameraOptions, ...]:
+    """The cameras of a layout, one by one; a list stays as it is."""
+    if not isinstance(cameras, CameraLayout):
+        return cameras
+    positions = cameras.positions(info.data.get("seed", 0))
+    return tuple(
+        CameraOptions(
+            name=name,
+            position=position,
+            look_at=aim,
+            focal_px=cameras.focal_px,
+            size_px=cameras.size_px,
+        )
+        for name, position, aim in zip(
+            cameras.names, positions.tolist(), cameras.aims(positions).tolist(), strict=True
+        )
+    )
+
+
+if TYPE_CHECKING:
+    Cameras = tuple[CameraOptions, ...]
+else:
+    Cameras = Annotated[
+        Annotated[tuple[CameraOptions, ...], Field(min_length=1)] | CameraLayout, AfterValidator(_hung)
+    ]
 
 
 class FootageOptions(Options):
@@ -158,8 +190,8 @@ class Scenario(Options):
     """the recorded one."""
     target: TargetOptions
     """What is tracked."""
-    cameras: tuple[CameraOptions, ...] = Field(min_length=1)
-    """The smart cameras, in the order of the graph."""
+    cameras: Cameras
+    """The smart cameras, in the order of the graph: a list, or a `layout` of as many as one likes."""
     network: NetworkOptions
     """Who talks to whom."""
     filter: FilterOptions = FilterOptions()
@@ -170,6 +202,8 @@ class Scenario(Options):
     """The central node."""
     baselines: BaselineOptions = BaselineOptions()
     """What DCPF is compared with."""
+    sensor: SensorOptions = SensorOptions()
+    """What `dcpf simulate` puts in the place of pictures."""
 
     @model_validator(mode="after")
     def _world_or_footage(self) -> "Scenario":
@@ -180,8 +214,8 @@ class Scenario(Options):
     @model_validator(mode="after")
     def _names(self) -> "Scenario":
         names = [camera.name for camera in self.cameras]
-        for name in names:
-            if names.count(name) > 1:
+        for name, count in Counter(names).items():
+            if count > 1:
                 raise ValueError(f"cameras has two named {name}: give each its own name")
         if self.central.name in names:
             raise ValueError(f"central.name is {self.central.name}, as is a camera: give it another name")
