@@ -30,6 +30,13 @@ def plot_simulation(found: Simulated, assembly: Assembly) -> Figure:
     ground, over_time = figure.subplots(1, 2, width_ratios=[1.1, 1])
     _draw_network(figure, cleaned(ground), found, assembly)
     _draw_errors(cleaned(over_time), found)
+    # both panels name what they share alike
+    named = {
+        label: handle
+        for axes in (ground, over_time)
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=4, frameon=False)
     return figure
 
 
@@ -38,14 +45,15 @@ def _draw_network(figure: Figure, axes: Axes, found: Simulated, assembly: Assemb
     places = np.array([assembly.cameras[name].center[:2] for name in names])
     row = {name: index for index, name in enumerate(names)}
     links = [(places[row[a]], places[row[b]]) for a, b in sorted(assembly.graph.edges)]
-    axes.add_collection(LineCollection(links, colors=FAINT, linewidths=0.5, rasterized=True))
+    axes.add_collection(LineCollection(links, colors=FAINT, linewidths=0.6, rasterized=True, zorder=1))
+    axes.grid(visible=False)
     # each camera in the colour of its own error
     own = np.sqrt((np.array(found.errors)[1:] ** 2).mean(axis=0))
     size = float(np.clip(4000 / len(names), 2, 60))
     low, high = max(float(own.min()), _FLOOR_M), max(float(own.max()), 2 * _FLOOR_M)
     dots = axes.scatter(
-        places[:, 0], places[:, 1], c=np.maximum(own, low), s=size, cmap="cividis_r", norm=LogNorm(low, high), linewidths=0,
-        rasterized=True,
+        places[:, 0], places[:, 1], c=np.maximum(own, low), s=size, cmap="cividis_r",
+        norm=LogNorm(low, high), linewidths=0, rasterized=True, zorder=2,
     )  # fmt: skip
     bar = figure.colorbar(dots, ax=axes, shrink=0.8, format="{x:g}")
     bar.set_label("RMSE of the camera's estimates / m")
@@ -53,15 +61,15 @@ def _draw_network(figure: Figure, axes: Axes, found: Simulated, assembly: Assemb
     axes.plot(*truth.T, color=COLORS["truth"], linewidth=3.2, alpha=0.35, label=LABELS["truth"])
     axes.plot(*exact.T, color=COLORS["cpf"], linewidth=1.4, label="all measurements")
     if found.last is not None:
+        estimates = found.last.mean
         axes.scatter(
-            found.last.mean[:, 0], found.last.mean[:, 1], s=6, color=COLORS["dcpf"], linewidths=0, alpha=0.5, rasterized=True,
-            label="estimates of the last frame",
+            estimates[:, 0], estimates[:, 1], s=6, color=COLORS["dcpf"], linewidths=0, alpha=0.5,
+            rasterized=True, zorder=4, label="the nodes' estimates in the last frame",
         )  # fmt: skip
     margin = 0.06 * float(np.ptp(places, axis=0).max()) + 1
     low_corner, high_corner = places.min(axis=0) - margin, places.max(axis=0) + margin
     axes.set(xlim=(low_corner[0], high_corner[0]), ylim=(low_corner[1], high_corner[1]), aspect="equal")
     axes.set(xlabel="x / m", ylabel="y / m", title=f"{found.scenario.name}, {len(names):,} cameras")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.28), ncols=3, frameon=False)
 
 
 def _draw_errors(axes: Axes, found: Simulated) -> None:
@@ -84,7 +92,6 @@ def _draw_errors(axes: Axes, found: Simulated) -> None:
     axes.set_title(
         f"{found.scenario.fusion.rule.replace('_', ' ')}, {found.scenario.network.iterations} rounds"
     )
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.34), ncols=3, frameon=False)
 
 
 def _of_those_that_see(found: Simulated) -> Float[np.ndarray, " T"]:

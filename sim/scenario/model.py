@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Field, PositiveInt, ValidationInfo, model_validator
+from pydantic import AfterValidator, Field, PositiveInt, model_validator
 
 from network.graph import Edge, Graph, complete, grid, path, ring, star
 from network.keys import check_name
@@ -71,13 +71,11 @@ class CameraOptions(Options):
         return self
 
 
-def _hung(
-    cameras: tuple[CameraOptions, ...] | CameraLayout, info: ValidationInfo
-) -> tuple[CameraOptions, ...]:
+def _hung(cameras: tuple[CameraOptions, ...] | CameraLayout, seed: int) -> tuple[CameraOptions, ...]:
     """The cameras of a layout, one by one; a list stays as it is."""
     if not isinstance(cameras, CameraLayout):
         return cameras
-    positions = cameras.positions(info.data.get("seed", 0))
+    positions = cameras.positions(seed)
     return tuple(
         CameraOptions(
             name=name,
@@ -96,7 +94,8 @@ if TYPE_CHECKING:
     Cameras = tuple[CameraOptions, ...]
 else:
     Cameras = Annotated[
-        Annotated[tuple[CameraOptions, ...], Field(min_length=1)] | CameraLayout, AfterValidator(_hung)
+        Annotated[tuple[CameraOptions, ...], Field(min_length=1)] | CameraLayout,
+        AfterValidator(lambda cameras, info: _hung(cameras, info.data.get("seed", 0))),
     ]
 
 
