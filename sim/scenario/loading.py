@@ -10,10 +10,11 @@ from nodes.calibration import CalibrationError, checked_camera, cropped, read_op
 from nodes.camera import Camera, look_at
 from nodes.sources import SourceError, VideoSource
 from sim.footage import FootageError, locate
+from sim.scenario.cameras import CameraOptions
 from sim.scenario.complaints import validate
 from sim.scenario.document import merge_defaults, read_document
 from sim.scenario.edges import with_edges
-from sim.scenario.model import CameraOptions, Scenario
+from sim.scenario.model import Scenario
 from sim.scenario.parsing import ScenarioError
 from sim.scenario.presets import preset_defaults
 from sim.world.background import require_inside
