@@ -13,11 +13,14 @@ Messages between nodes are little-endian and begin with one header of 24 bytes:
 | 20 | u32 | frame |
 | 24 | | consensus: K numbers, float16 ones after an i16 e and times 2^e; pixels: height x width x 3, BGR |
 
+A preview is a JPEG that any viewer shows; what else it says is JSON in the picture's comment.
+
 Reading never trusts: what is not exactly such a message is refused with its reason.
 """
 
 import json
 import struct
+from dataclasses import replace
 from functools import lru_cache
 from hashlib import blake2b
 from typing import Any, TypeVar
@@ -26,6 +29,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from pydantic import TypeAdapter, ValidationError
 
+from network import jpeg
 from network.errors import RefusedMessage
 from network.messages import (
     ConfirmMessage,
@@ -35,6 +39,7 @@ from network.messages import (
     Message,
     PeerMessage,
     PixelsMessage,
+    PreviewMessage,
     PublicMessage,
     StatusMessage,
     TruthMessage,
@@ -44,6 +49,7 @@ from network.quantization import ENCODINGS, LARGEST, Encoding, half_exponent
 VERSION = 1
 MAX_PIXELS = 64_000_000
 MAX_JSON_BYTES = 1_000_000
+MAX_JPEG_BYTES = 20_000_000
 MAX_MAGNITUDE = LARGEST["float64"]
 """Larger numbers are refused like infinity: sums and products of them would overflow."""
 
@@ -56,7 +62,8 @@ _NUMBERS: dict[Encoding, np.dtype[np.floating]] = {
 _EXPONENT = struct.Struct("<h")
 _KINDS: dict[type[PeerMessage], int] = {ConsensusMessage: 1, PixelsMessage: 2, ConfirmMessage: 3}
 _JSON: dict[type, TypeAdapter[Any]] = {
-    kind: TypeAdapter(kind) for kind in (EstimateMessage, ControlMessage, StatusMessage, TruthMessage)
+    kind: TypeAdapter(kind)
+    for kind in (EstimateMessage, ControlMessage, StatusMessage, TruthMessage, PreviewMessage)
 }
 _JSON_REASONS = {"json_invalid": "json", "finite_number": "not-finite", "value_error": "shape"}
 
@@ -76,6 +83,8 @@ def encode(run: str, message: Message) -> bytes:
             return encode_pixels(run, message)
         case ConfirmMessage():
             return encode_confirm(run, message)
+        case PreviewMessage():
+            return encode_preview(message)
         case _:
             return encode_public(message)
 
@@ -188,8 +197,7 @@ def encode_public(message: PublicMessage) -> bytes:
     Raises:
         ValueError: A number in it is not finite.
     """
-    fields = _JSON[type(message)].dump_python(message, mode="json")
-    return json.dumps(fields, separators=(",", ":"), allow_nan=False).encode()
+    return _to_json(message)
 
 
 def decode_public(kind: type[_Public], data: bytes) -> _Public:
@@ -200,12 +208,33 @@ def decode_public(kind: type[_Public], data: bytes) -> _Public:
     """
     if len(data) > MAX_JSON_BYTES:
         raise RefusedMessage("length")
-    try:
-        message: _Public = _JSON[kind].validate_json(data)
-    except ValidationError as error:
-        found = error.errors(include_url=False, include_context=False)[0]["type"]
-        raise RefusedMessage(_JSON_REASONS.get(found, "fields")) from error
+    message: _Public = _from_json(kind, data)
     return message
+
+
+def encode_preview(message: PreviewMessage) -> bytes:
+    """A preview: its picture, with everything else in the comment.
+
+    Raises:
+        ValueError: There are too many particles for a comment.
+    """
+    return jpeg.with_comment(message.jpeg, _to_json(message))
+
+
+def decode_preview(data: bytes) -> PreviewMessage:
+    """A preview; the picture itself is not looked into.
+
+    Raises:
+        RefusedMessage: The data are not such a message.
+    """
+    if len(data) > MAX_JPEG_BYTES:
+        raise RefusedMessage("length")
+    parts = jpeg.without_comment(data)
+    if parts is None:
+        raise RefusedMessage("jpeg")
+    picture, comment = parts
+    message: PreviewMessage = _from_json(PreviewMessage, comment)
+    return replace(message, jpeg=picture)
 
 
 def pack_symmetric(matrix: Float[np.ndarray, "*C D D"]) -> Float[np.ndarray, "*C K"]:
@@ -237,6 +266,19 @@ def _places(size: int) -> Int[np.ndarray, "D D"]:
     rows, columns = np.triu_indices(size)
     places[rows, columns] = places[columns, rows] = np.arange(len(rows))
     return places
+
+
+def _to_json(message: PublicMessage | PreviewMessage) -> bytes:
+    fields = _JSON[type(message)].dump_python(message, mode="json")
+    return json.dumps(fields, separators=(",", ":"), allow_nan=False).encode()
+
+
+def _from_json(kind: type, data: bytes) -> Any:
+    try:
+        return _JSON[kind].validate_json(data)
+    except ValidationError as error:
+        found = error.errors(include_url=False, include_context=False)[0]["type"]
+        raise RefusedMessage(_JSON_REASONS.get(found, "fields")) from error
 
 
 def _usable(payload: Float[np.ndarray, " K"]) -> bool:

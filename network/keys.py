@@ -54,6 +54,11 @@ def status(run: str, node: str = ANY) -> str:
     return _of_node(run, node, "status")
 
 
+def preview(run: str, node: str = ANY) -> str:
+    """Where a camera shows its pictures, while somebody looks."""
+    return _of_node(run, node, "preview")
+
+
 def alive(run: str, node: str = ANY) -> str:
     """The liveliness token of a node: it stands while the node can hear."""
     return _of_node(run, node, "alive")
@@ -69,6 +74,11 @@ def control(run: str) -> str:
     return _of_run(run, "control")
 
 
+def of_run(run: str) -> str:
+    """What all keys of a run begin with."""
+    return f"{_ROOT}/{_chunk(run)}/"
+
+
 def node_of(key: str) -> str:
     """The node that a key belongs to.
 
@@ -82,11 +92,11 @@ def node_of(key: str) -> str:
 
 
 def _of_node(run: str, node: str, kind: str) -> str:
-    return f"{_ROOT}/{_chunk(run)}/{_chunk(node)}/{kind}"
+    return f"{of_run(run)}{_chunk(node)}/{kind}"
 
 
 def _of_run(run: str, kind: str) -> str:
-    return f"{_ROOT}/{_chunk(run)}/{kind}"
+    return of_run(run) + kind
 
 
 def _chunk(name: str) -> str:

@@ -1,7 +1,8 @@
 """Messages: everything that nodes say to each other and to the outside, as frozen values.
 
-The first three travel as bytes between nodes, the others as JSON for anybody; ``network.codec`` turns both
-into bytes and back. ``kind`` is the last chunk of the key under which a message is sent.
+The first three travel as bytes between nodes, the others as JSON for anybody, a preview's in its JPEG;
+``network.codec`` turns both into bytes and back. ``kind`` is the last chunk of the key under which a message
+is sent.
 """
 
 from collections.abc import Callable
@@ -17,18 +18,17 @@ from network.keys import NAME_PATTERN
 from network.quantization import Encoding
 
 
-def _json_array(nested: Any) -> GetPydanticSchema:
-    """Reads an array from the nested lists of this type."""
+def _json_array(nested: Any, empty: tuple[int, ...] = (0,)) -> GetPydanticSchema:
+    """Reads an array from the nested lists of this type; an empty list tells no shape and is given one."""
+
+    def to_array(rows: list[Any]) -> np.ndarray:
+        """Raises ValueError where the rows differ in length."""
+        return np.array(rows, dtype=float) if rows else np.empty(empty)
 
     def schema(_: Any, handler: Callable[[Any], CoreSchema]) -> CoreSchema:
-        return core_schema.no_info_after_validator_function(_to_array, handler(nested))
+        return core_schema.no_info_after_validator_function(to_array, handler(nested))
 
     return GetPydanticSchema(schema)
-
-
-def _to_array(rows: list[Any]) -> np.ndarray:
-    """Raises ValueError where the rows differ in length."""
-    return np.array(rows, dtype=float)
 
 
 _AsLists = PlainSerializer(np.ndarray.tolist)
@@ -36,6 +36,7 @@ Vector = Annotated[Float[np.ndarray, " D"], _json_array(list[float]), _AsLists]
 Matrix = Annotated[Float[np.ndarray, "D D"], _json_array(list[list[float]]), _AsLists]
 Name = Annotated[str, Field(pattern=f"^{NAME_PATTERN}$")]
 Frame = Annotated[int, Field(ge=0)]
+Points = Annotated[Float[np.ndarray, "N A"], _json_array(list[list[float]], empty=(0, 2)), _AsLists]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Numbers = dict[str, int | float | dict[str, int | float]]
 
@@ -176,6 +177,37 @@ class StatusMessage:
     timing: Numbers
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PreviewMessage:
+    """A camera's picture for people, as a JPEG, and where its filter believes the target to be.
+
+    Attributes:
+        run: Name of the run.
+        node: The camera.
+        frame: Frame of the run.
+        time_s: Its time, seconds from frame 0.
+        particles: Positions of some particles of the fusion filter, all of the same weight; metres, or pixels
+            of a camera that tracks in its image plane.
+        jpeg: The picture, in the camera's own size.
+
+    Raises:
+        ValueError: The particles are not on a plane or in a volume.
+    """
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    kind: ClassVar[str] = "preview"
+    run: Name
+    node: Name
+    frame: Frame
+    time_s: float
+    particles: Points
+    jpeg: Annotated[bytes, Field(exclude=True)] = b""
+
+    def __post_init__(self) -> None:
+        if self.particles.shape[1] not in (2, 3):
+            raise ValueError(f"particles of {self.particles.shape[1]} numbers are no positions")
+
+
 @dataclass(frozen=True, slots=True)
 class Visibility:
     """How much of the target one camera sees.
@@ -217,4 +249,4 @@ PeerMessage = ConsensusMessage | PixelsMessage | ConfirmMessage
 PublicMessage = EstimateMessage | ControlMessage | StatusMessage | TruthMessage
 """What everybody may read, in JSON."""
 
-Message = PeerMessage | PublicMessage
+Message = PeerMessage | PublicMessage | PreviewMessage

@@ -18,6 +18,7 @@ from network.messages import (
     EstimateMessage,
     PeerMessage,
     PixelsMessage,
+    PreviewMessage,
     StatusMessage,
 )
 
@@ -123,7 +124,11 @@ class Transport(Protocol):
     def wait_for_control(self, timeout_s: float) -> ControlMessage | None:
         """The next order to this run, None when time is up; 0 only looks."""
 
-    def send(self, message: PeerMessage | EstimateMessage | StatusMessage) -> None:
+    @property
+    def watched(self) -> bool:
+        """Whether somebody looks at previews: they are sent only then."""
+
+    def send(self, message: PeerMessage | EstimateMessage | StatusMessage | PreviewMessage) -> None:
         """Sends a message of this node to whom it concerns."""
 
     def receive(self, sender: str, timeout_s: float) -> PeerMessage | None:

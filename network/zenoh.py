@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Iterable, Sequence
 from functools import partial
+from typing import Any
 
 import zenoh
 from zenoh import CongestionControl, Locality, Priority
@@ -24,6 +25,7 @@ from network.messages import (
     EstimateMessage,
     PeerMessage,
     PixelsMessage,
+    PreviewMessage,
     StatusMessage,
     TruthMessage,
 )
@@ -35,6 +37,7 @@ _ENCODINGS = {
     kind: f"application/json;dcpf.{kind.kind}.v1"
     for kind in (EstimateMessage, StatusMessage, ControlMessage, TruthMessage)
 }
+_PREVIEW_ENCODING = "image/jpeg"
 _WATCH_PERIOD_S = 0.01
 _WAKE_UP = b""
 
@@ -86,6 +89,7 @@ class ZenohTransport:
         self._session = sessions.open_peer(listen, connect)
         self._inboxes = {sender: self._declare_inbox(sender) for sender in self._heard}
         self._declare_orders()
+        self._watched = threading.Event()
         self._publishers = self._declare_publishers(drop_late_pixels=drop_late_pixels)
         self._declare_liveliness()
         threading.Thread(target=self._watch, name="watchdog", daemon=True).start()
@@ -118,7 +122,12 @@ class ZenohTransport:
             except RefusedMessage as refusal:
                 self.counters.refuse("control", refusal.reason)
 
-    def send(self, message: PeerMessage | EstimateMessage | StatusMessage) -> None:
+    @property
+    def watched(self) -> bool:
+        """Whether somebody looks at previews: they are sent only then."""
+        return self._watched.is_set()
+
+    def send(self, message: PeerMessage | EstimateMessage | StatusMessage | PreviewMessage) -> None:
         """Sends a message of this node to whom it concerns."""
         data = codec.encode(self._run, message)
         if isinstance(message, PeerMessage):
@@ -187,6 +196,14 @@ class ZenohTransport:
         )
         public = partial(publish, congestion_control=CongestionControl.BLOCK)
         pixels_control = CongestionControl.DROP if drop_late_pixels else CongestionControl.BLOCK
+        # Whoever looks too slowly misses pictures and holds nobody up.
+        preview = publish(
+            keys.preview(run, name),
+            encoding=_PREVIEW_ENCODING,
+            congestion_control=CongestionControl.DROP,
+            priority=Priority.DATA_LOW,
+        )
+        preview.declare_matching_listener(zenoh.handlers.Callback(self._on_watched))
         return {
             ConsensusMessage: rounds(keys.consensus(run, name)),
             ConfirmMessage: rounds(keys.confirm(run, name)),
@@ -195,7 +212,14 @@ class ZenohTransport:
             ),
             EstimateMessage: public(keys.estimate(run, name), encoding=_ENCODINGS[EstimateMessage]),
             StatusMessage: public(keys.status(run, name), encoding=_ENCODINGS[StatusMessage]),
+            PreviewMessage: preview,
         }
+
+    def _on_watched(self, status: zenoh.MatchingStatus) -> None:
+        if status.matching:
+            self._watched.set()
+        else:
+            self._watched.clear()
 
     def _declare_liveliness(self) -> None:
         self._session.liveliness().declare_subscriber(
@@ -234,6 +258,25 @@ class ZenohTransport:
                 self._session.put(
                     self._inbox_keys[sender], _WAKE_UP, allowed_destination=Locality.SESSION_LOCAL
                 )
+
+
+def has_listeners(publisher: zenoh.Publisher) -> bool:
+    """Whether anybody subscribes to what a publisher publishes."""
+    status: Any = publisher.matching_status  # not a bool, whatever Zenoh's types say: always true as one
+    return bool(status.matching)
+
+
+def publish_again(session: zenoh.Session, key: str, data: bytes) -> None:
+    """Publishes what was told in a run, byte for byte, from outside the nodes."""
+    _, _, kind = key.rpartition("/")
+    picture = kind == PreviewMessage.kind
+    session.put(
+        key,
+        data,
+        encoding=_PREVIEW_ENCODING if picture else f"application/json;dcpf.{kind}.v1",
+        congestion_control=CongestionControl.DROP if picture else CongestionControl.BLOCK,
+        priority=Priority.DATA_LOW if picture else Priority.DATA,
+    )
 
 
 def publish(session: zenoh.Session, run: str, message: ControlMessage | TruthMessage) -> None:

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from threading import Event
 from typing import Literal
 
+import numpy as np
+from jaxtyping import UInt8
+
 from network.messages import (
     ConfirmMessage,
     ConsensusMessage,
@@ -25,6 +28,8 @@ from nodes.telemetry import Counters, State, Telemetry
 
 AHEAD = 2
 """Frames that a camera may be ahead of the last one that the sink of its pictures has confirmed."""
+REPORT_PERIOD_S = 1.0
+"""How often a node tells how it is, while somebody looks."""
 PATIENCE_S = 0.25
 """How long a wait lasts at most before the shell looks whether it has been told to stop."""
 
@@ -61,6 +66,7 @@ class Shell:
         self.telemetry = Telemetry()
         self._stopped = stopped
         self._start_s = 0.0
+        self._reported_s = 0.0
 
     def wait_for_start(self, linked: Iterable[str]) -> bool:
         """Announces the node and waits for the start; False if it is told to leave instead.
@@ -119,6 +125,18 @@ class Shell:
         left = self._start_s + (index + 1) / self.pace.rate_hz - time.time()
         return time.monotonic() + left
 
+    def show(self, node: SmartCamera, index: int, image: UInt8[np.ndarray, "H W 3"]) -> None:
+        """Shows a frame that is done to those who look, if anybody does."""
+        if self.transport.watched:
+            self.transport.send(node.preview(index, image))
+            self.report_now_and_then(index, node.counters)
+
+    def report_now_and_then(self, index: int, counters: Counters) -> None:
+        """Tells those who look how the node is, once a second."""
+        if self.transport.watched and time.monotonic() - self._reported_s >= REPORT_PERIOD_S:
+            self._reported_s = time.monotonic()
+            self.report("running", index, counters)
+
     def report(self, state: State, frame: int, counters: Counters) -> None:
         """Tells everybody how the node is."""
         self.transport.send(self.telemetry.status(self.name, state, frame, self.transport.counters, counters))
@@ -158,6 +176,7 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         done = done if shell.stopped else index
         if index == 0:
             shell.report("running", index, node.counters)
+        shell.show(node, index, image)
     source.close()
     shell.report("failed" if shell.stopped else "done", done, node.counters)
     shell.wait_for_stop()
@@ -220,6 +239,7 @@ def run_central(node: Central, shell: Shell) -> None:
             elif left <= 0:
                 shell.telemetry.late += 1
                 _send(node.on_deadline(), shell)
+        shell.report_now_and_then(node.frame - 1, {})
     shell.report("done" if node.frame == shell.frames else "failed", node.frame - 1, {})
     shell.wait_for_stop()
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from network.consensus import Consensus
-from network.messages import ConsensusMessage, EstimateMessage
+from network.messages import ConsensusMessage, EstimateMessage, PreviewMessage
 from nodes.array_estimator import ArrayEstimator
 from nodes.estimator import SirEstimator
 from nodes.filtering.appearance import Appearance, pack_looks, settled, unpack_looks
@@ -21,6 +21,7 @@ from nodes.filtering.local import LocalResult, local_filter
 from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.particles import Particles, effective_sample_size, resample_if_degenerate
 from nodes.filtering.sighting import Sighting
+from nodes.preview import preview
 from nodes.setup import TrackingSetup
 from nodes.simd.report import FrameReport
 from nodes.telemetry import Counters
@@ -113,6 +114,11 @@ class SmartCamera:
         """The frame's time is up: what the rounds have reached must do."""
         self._consensus.cut()
         return self._with_result(())
+
+    def preview(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> PreviewMessage:
+        """What a frame that is done looks like, for people."""
+        run, time_s = self._setup.run, index / self._setup.rate_hz
+        return preview(run, self.name, index, time_s, image, self._particles)
 
     @property
     def waiting_for(self) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """For all tests: how many examples hypothesis tries, and a small room for whole nodes."""
 
+import time
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -63,3 +64,18 @@ class Room:
 def room():
     """The class, to furnish one as the test needs it."""
     return Room
+
+
+@pytest.fixture
+def wait_until():
+    """Waits until something holds, and tells whether it did in time."""
+
+    def wait(condition, limit_s=30.0):
+        limit = time.monotonic() + limit_s
+        while not condition():
+            if time.monotonic() > limit:
+                return False
+            time.sleep(0.02)
+        return True
+
+    return wait

@@ -17,15 +17,36 @@ OUTSIDE_WORLD = {
 
 PURE = (
     *sorted((ROOT / "nodes/filtering").rglob("*.py")),
+    *sorted(path for path in (ROOT / "nodes/counting").glob("*.py") if path.name != "build.py"),
+    *sorted((ROOT / "sim/metrics").glob("*.py")),
+    ROOT / "sim/running/metrics.py",
+    *(ROOT / "sim/simulation" / name for name in ("gaussians.py", "sensor.py", "simulation.py")),
+    ROOT / "sim/scenario/cameras.py",
     *sorted((ROOT / "network/averaging").glob("*.py")),
+    *sorted((ROOT / "nodes/simd").rglob("*.py")),
     *(
         ROOT / "nodes" / name
-        for name in ("camera.py", "central.py", "estimator.py", "setup.py", "smart_camera.py")
+        for name in (
+            "array_estimator.py",
+            "camera.py",
+            "central.py",
+            "estimator.py",
+            "preview.py",
+            "setup.py",
+            "smart_camera.py",
+        )
+    ),
+    *(
+        ROOT / "sim" / name
+        for name in (
+            *("live/nodes.py", "live/setting.py", "live/story.py", "replay/playback.py"),
+            *("recording/foxglove.py", "recording/scene.py", "recording/schemas.py"),
+        )
     ),
     *(
         ROOT / "network" / name
         for name in (
-            *("codec.py", "consensus.py", "errors.py", "graph.py", "keys.py", "memory.py"),
+            *("codec.py", "consensus.py", "errors.py", "graph.py", "jpeg.py", "keys.py", "memory.py"),
             *(
                 "messages.py",
                 "options.py",

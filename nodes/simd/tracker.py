@@ -11,7 +11,12 @@ from jaxtyping import Float, UInt8
 from nodes.simd.array import ProcessorArray
 from nodes.simd.memory import ExternalMemory, Word
 from nodes.simd.programs.binning import bin_picture
-from nodes.simd.programs.counting import count_in_columns, region
+from nodes.simd.programs.counting import (
+    count_in_columns,
+    count_in_passes,
+    particles_in_columns,
+    region,
+)
 from nodes.simd.programs.motion import predict, seeds
 from nodes.simd.programs.normalizing import Group, add_up, normalized, scale_factor, weighted_mean
 from nodes.simd.programs.resampling import replicate, replication_bounds
@@ -67,6 +72,11 @@ class SimdTracker:
         firsts = accumulate(options.n_particles[:-1], initial=array.n - n_used)
         self._groups = [Group(first, n) for first, n in zip(firsts, options.n_particles, strict=True)]
         self._active = slice(array.n - n_used, array.n)
+        # Algorithm 1 counts every pixel of rectangles, and is the faster one for few particles.
+        plain = options.shape == "rectangle" and options.kernel == "uniform"
+        fits = options.region_px[0] <= array.n
+        few = not particles_in_columns(n_used, array.n, options.region_px)
+        self._side_by_side = plain and fits and few
         # Everything that lives from one frame to the next, or through the odd lines in between
         self._state = [array.number("Target state (current and previous)", 1) for _ in range(4)]
         self._weight = array.number("Particle weights")
@@ -167,7 +177,9 @@ class SimdTracker:
 
     def report(self) -> FrameReport:
         """What the last frame has cost."""
-        return FrameReport.of(self.array, self._memory.pixels.shape[0], sum(self.options.n_particles))
+        width = self.options.region_px[0]
+        asking = self.array.n // width * width if self._side_by_side else sum(self.options.n_particles)
+        return FrameReport.of(self.array, self._memory.pixels.shape[0], asking)
 
     def _bin(self, image: UInt8[np.ndarray, "H W 3"]) -> None:
         with self.array.step(Step.BINNING):
@@ -192,10 +204,11 @@ class SimdTracker:
         """Counts as many bins at a time as there are words; yields the first bin with the words."""
         n_bins = self.options.binning.n_bins
         center = (self._state[0], self._state[1])
+        count = count_in_passes if self._side_by_side else count_in_columns
         for first in range(0, n_bins, len(self._histogram)):
             words = self._histogram[: n_bins - first]
             with self.array.step(Step.HISTOGRAMS):
-                count_in_columns(
+                count(
                     self.array,
                     words,
                     self._memory,
@@ -253,8 +266,9 @@ class SimdTracker:
                 factor = scale_factor(array, total, group)
             with array.step(Step.MEAN):
                 mean = [weighted_mean(array, weight, word, total, group) for word in self._state[:2]]
-            with array.step(Step.NORMALIZATION):
-                normalized(array, self._weight, weight, factor, extra_words=0)
+            with array.step(Step.NORMALIZATION), array.using(array.number()) as (share,):
+                normalized(array, share, weight, factor, extra_words=0)
+                array.copy(self._weight, share, when=array.less(place, group.n))
             with array.step(Step.RESAMPLING):
                 replication_bounds(array, (start, end), weight, factor, place, group, self._rng)
                 replicate(array, self._state, (start, end), place, group)

@@ -1,120 +1,174 @@
-"""`dcpf compare`: many runs in process, paired by seed: a table, a plot, and the figures."""
+"""`dcpf compare`: many runs, paired by seed, over any keys of the scenario: a table, figures, and files."""
 
 import json
 import sys
+from collections.abc import Sequence
 from datetime import UTC, datetime
+from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any
 
-import joblib
 import typer
 from rich.console import Console
 from rich.table import Table
 
-from sim.commands.shared import (
-    AsJson,
-    Frames,
-    Overrides,
-    length_text,
-    progress_bar,
-    read_scenario,
-    split_overrides,
-)
-from sim.running.experiment import compare as compare_runs
-from sim.running.experiment import run_many
+from sim.commands.shared import AsJson, Frames, Overrides, length_text, progress_bar, split_overrides
+from sim.experiments.found.claims import Verdict
+from sim.experiments.options import ExperimentOptions, StudyOptions, is_experiment
+from sim.experiments.plan import Plan, make_plan, plan_experiment
+from sim.experiments.sweeps import parse_sweep
 from sim.running.recorder import RecordingError
 from sim.running.results import length
+from sim.scenario.document import read_document
+from sim.scenario.parsing import ScenarioError
 
 
 def compare(
-    scenarios: Annotated[list[Path], typer.Argument(metavar="SCENARIO...", help="Scenario files.")],
-    runs: Annotated[int, typer.Option(help="Seeds of each scenario, from the scenario's on.", min=1)] = 10,
+    scenarios: Annotated[
+        list[Path], typer.Argument(metavar="SCENARIO...", help="Scenario files, or one experiment file.")
+    ],
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            help="Seeds of each scenario, from the scenario's on; 10 by default.", min=1, show_default=False
+        ),
+    ] = None,
     frames: Frames = None,
     overrides: Overrides = None,
+    sweeps: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sweep",
+            metavar="KEY=VALUES",
+            help="Sweep any key of the scenario: network.iterations=1:20, filter.model_update.alpha=0:0.5:0.1"
+            " or network.graph=ring,star. Several make a grid; the first is the figure's axis.",
+        ),
+    ] = None,
     jobs: Annotated[int | None, typer.Option(help="Processes; all cores by default.", min=1)] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the results.", show_default=False)] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="Dask scheduler to compute on instead, such as tcp://10.0.0.1:8786."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of the results; what is finished there is not computed again.", show_default=False
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run scenarios with several seeds and compare DCPF, CPF and the single cameras."""
-    folder = out or Path("runs") / f"compare-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
+    """Run scenarios or an experiment with several seeds and compare DCPF, CPF and the single cameras."""
+    # What computes and draws takes its time to import; --help does not wait for it.
+    import joblib
+
+    from sim.experiments.computing.engine import compute_here, compute_on_cluster
+    from sim.experiments.computing.store import Store
+    from sim.experiments.found.claims import judge
+    from sim.experiments.found.reporting import report, write_files
+    from sim.experiments.run import run_experiment
+    from sim.pictures.experiment import write_figures
+
     given = [*split_overrides(overrides), *([("frames", str(frames))] if frames else [])]
-    first = [read_scenario(path, overrides, frames=frames) for path in scenarios]
-    _make(folder)
-    report: dict[str, Any] = {}
-    with progress_bar("runs", len(scenarios) * runs) as bar:
-        for path, scenario in zip(scenarios, first, strict=True):
-            seeds = range(scenario.seed, scenario.seed + runs)
-            summaries = []
-            for summary in run_many([path], given, seeds, jobs or joblib.cpu_count()):
-                summaries.append(summary)
-                bar(len(summaries) + runs * len(report))
-            label = f"{scenario.name} ({scenario.preset})"
-            if label in report:
-                label = f"{path} ({scenario.preset})"
-            report[label] = {**compare_runs(summaries), "summaries": summaries}
+    plan = _plan(scenarios, sweeps or [], given, runs)
+    results = out or Path("runs") / f"{plan.options.name}-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
+    store = Store(results / "parts")
+    engine = (
+        partial(compute_on_cluster, address=cluster)
+        if cluster
+        else partial(compute_here, n_jobs=jobs or joblib.cpu_count())
+    )
+    findings = run_experiment(plan, store, engine, partial(progress_bar, "parts of runs"))
+    verdicts = judge(findings)
+    found = report(findings, verdicts)
     try:
-        (folder / "comparison.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
-        _plot(report, folder)
+        write_files(findings, found, verdicts, results)
+        write_figures(findings, results)
     except OSError as error:
         raise RecordingError(
-            f"{folder}: cannot be written: {error.strerror}: free space, or name another --out"
+            f"{results}: cannot be written: {error.strerror}: free space, or name another --out"
         ) from error
     if as_json:
-        sys.stdout.write(json.dumps(report) + "\n")
+        sys.stdout.write(json.dumps(found) + "\n")
     else:
-        _print(report, folder)
+        _print({label: each for label, each in found.items() if label != "claims"}, verdicts, results)
 
 
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RecordingError(f"{folder}: cannot be made: {error.strerror}: name another --out") from error
+def _plan(paths: list[Path], sweeps: list[str], given: list[tuple[str, str]], runs: int | None) -> Plan:
+    """What to compute: the experiment of a file, or one study over the scenarios and sweeps."""
+    experiments = [document for document in map(read_document, paths) if is_experiment(document)]
+    if experiments:
+        document, *_ = experiments
+        if len(paths) > 1:
+            raise ScenarioError(f"{document.path}: is an experiment: give it alone, or scenarios only")
+        if sweeps:
+            raise ScenarioError(f"{document.path}: is an experiment with sweeps of its own: take --sweep out")
+        return plan_experiment(document, given, runs)
+    chosen = {sweep.key: sweep.values for sweep in map(parse_sweep, sweeps)}
+    if len(chosen) < len(sweeps):
+        raise ScenarioError("--sweep: a key is swept twice: give its values in one list")
+    study = StudyOptions(plot="error" if chosen else "strips", sweep=chosen)
+    options = ExperimentOptions(
+        name="compare", runs=runs or 10, scenarios=tuple(map(str, paths)), studies={"comparison": study}
+    )
+    return make_plan(options, Path(), given, lambda _, key: f"--sweep {key}")
 
 
-def _plot(report: dict[str, Any], folder: Path) -> None:
-    # Matplotlib takes its time to import, and only this needs it.
-    from sim.pictures.comparison import plot_comparison
-    from sim.pictures.plots import write_figure
+def _print(found: dict[str, Any], verdicts: Sequence[Verdict], folder: Path) -> None:
+    # In a pipe, no line need fit a terminal.
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else 200)
+    for settings, rows in groupby(found.items(), key=lambda item: tuple(item[1]["settings"])):
+        _print_table(console, settings, dict(rows))
+    for label, each in found.items():
+        if not each["settings"]:
+            _print_more(console, label, each)
+    for verdict in verdicts:
+        holds = "holds" if verdict.holds else "does not hold"
+        console.print(
+            f"{verdict.study}, {verdict.label}, {verdict.claim}: {holds}: {verdict.text}", soft_wrap=True
+        )
+    console.print(f"figures and plots in {folder}", soft_wrap=True)
 
-    rows = [{**run, "scenario": label} for label, each in report.items() for run in each["summaries"]]
-    write_figure(plot_comparison(rows), folder / "comparison")
 
-
-def _print(report: dict[str, Any], folder: Path) -> None:
-    console = Console(highlight=False)
+def _print_table(console: Console, keys: tuple[str, ...], rows: dict[str, Any]) -> None:
+    """A table of groups with the same swept keys: median and worst run, or the median alone of many."""
     table = Table()
-    table.add_column("scenario", no_wrap=True)
-    table.add_column("over the runs", no_wrap=True)
+    for heading in ("scenario", *keys, "over the runs"):
+        table.add_column(heading, no_wrap=True)
     for heading in ("DCPF", "CPF", "best single", "DCPF/CPF", "ANEES"):
         table.add_column(heading, justify="right", no_wrap=True)
-    for label, each in report.items():
-        rmse, unit = length(each, "rmse"), each["unit"]
-        for title, row, statistic in (
-            ("median", label, "median"),
-            ("worst", f"  {each['runs']} runs", "max"),
-        ):
+    for label, each in rows.items():
+        name = label.removesuffix(", ".join(f"{key}={value}" for key, value in each["settings"].items()))
+        statistics = [("median", name.strip(), "median"), ("worst", f"  {each['runs']} runs", "max")]
+        for title, row, statistic in statistics[: 1 if keys else 2]:
             table.add_row(
                 row,
+                *each["settings"].values(),
                 title,
-                *(_length(rmse[name], statistic, unit) for name in ("dcpf", "cpf", "best_single")),
+                *(
+                    _length(length(each, "rmse")[track], statistic, each["unit"])
+                    for track in ("dcpf", "cpf", "best_single")
+                ),
                 _figure(each["ratio_dcpf_cpf"], statistic),
                 _figure(each["anees"]["dcpf"], statistic),
             )
     console.print(table)
-    for label, each in report.items():
-        lost = each["lost_fraction"]
-        disagreement = _length(length(each, "disagreement"), "median", each["unit"])
-        console.print(
-            f"{label}: target lost in {lost['dcpf']:.0%} of the runs by DCPF, in {lost['cpf']:.0%} by CPF;"
-            f" nodes disagree by {disagreement}",
-            soft_wrap=True,
-        )
-        indefinite = each["indefinite_local_fraction"]
-        if indefinite and indefinite["max"]:
-            share = f"{indefinite['median']:.0%}"
-            console.print(f"  Eq. 17's ratio was no density in {share} of the local results", soft_wrap=True)
-    console.print(f"figures and plots in {folder}", soft_wrap=True)
+
+
+def _print_more(console: Console, label: str, each: dict[str, Any]) -> None:
+    lost = each["lost_fraction"]
+    disagreement = _length(length(each, "disagreement"), "median", each["unit"])
+    console.print(
+        f"{label}: target lost in {lost['dcpf']:.0%} of the runs by DCPF, in {lost['cpf']:.0%} by CPF;"
+        f" nodes disagree by {disagreement}",
+        soft_wrap=True,
+    )
+    indefinite = each["indefinite_local_fraction"]
+    if indefinite and indefinite["max"]:
+        share = f"{indefinite['median']:.0%}"
+        console.print(f"  Eq. 17's ratio was no density in {share} of the local results", soft_wrap=True)
 
 
 def _length(values: dict[str, float] | None, statistic: str, unit: str) -> str:

@@ -11,12 +11,13 @@ from rich.console import Console
 
 from network.errors import NetworkError
 from nodes.sources import SourceError
+from sim.experiments.computing.errors import EngineError
 from sim.footage import FootageError
 from sim.running.children import RunFailed
 from sim.running.recorder import RecordingError
 from sim.scenario.parsing import ScenarioError
 
-USERS_ERRORS = (ScenarioError, NetworkError, SourceError, FootageError, RecordingError)
+USERS_ERRORS = (ScenarioError, NetworkError, SourceError, FootageError, RecordingError, EngineError)
 """What the user can put right: exit code 2."""
 
 

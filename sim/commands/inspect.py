@@ -10,8 +10,11 @@ from rich.table import Table
 
 from sim.assembly import Assembly
 from sim.commands.shared import AsJson, Overrides, ScenarioPath, read_scenario
+from sim.experiments.options import ExperimentOptions
 from sim.footage import fetch
 from sim.scenario.model import SPACES, Scenario
+
+_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def check(scenario: ScenarioPath, overrides: Overrides = None, as_json: AsJson = False) -> None:
@@ -46,9 +49,14 @@ def check(scenario: ScenarioPath, overrides: Overrides = None, as_json: AsJson =
     Console(highlight=False).print(table)
 
 
-def schema() -> None:
+def schema(
+    experiment: Annotated[
+        bool, typer.Option("--experiment", help="Of experiment files, for dcpf compare.")
+    ] = False,
+) -> None:
     """Print the JSON Schema of scenario files; editors complete and check keys with it."""
-    sys.stdout.write(json.dumps(scenario_schema(), indent=2) + "\n")
+    found = experiment_schema() if experiment else scenario_schema()
+    sys.stdout.write(json.dumps(found, indent=2) + "\n")
 
 
 def scenario_schema() -> dict[str, Any]:
@@ -56,7 +64,12 @@ def scenario_schema() -> dict[str, Any]:
     document = Scenario.model_json_schema()
     document["required"].remove("network")
     document["$defs"]["NetworkOptions"]["required"].remove("consensus")
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **document}
+    return {"$schema": _DIALECT, **document}
+
+
+def experiment_schema() -> dict[str, Any]:
+    """The JSON Schema of experiment files."""
+    return {"$schema": _DIALECT, **ExperimentOptions.model_json_schema()}
 
 
 def footage(

@@ -2,6 +2,9 @@
 
 import json
 import sys
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,6 +14,7 @@ from rich.table import Table
 
 from sim.assembly import Assembly
 from sim.commands import BEGAN_S
+from sim.commands.live import DEFAULT_PORT, LOOPBACK, Bind, Live, Port, page, wait_for_audience
 from sim.commands.shared import (
     AsJson,
     Frames,
@@ -23,7 +27,7 @@ from sim.commands.shared import (
     yes_no,
 )
 from sim.running.in_process import run_in_process
-from sim.running.recorder import Recorder, default_folder
+from sim.running.recorder import Film, Recorder, default_folder
 from sim.running.results import Results, length, summarize
 from sim.scenario.model import Scenario
 
@@ -48,6 +52,12 @@ def run(
     fail_if_lost: Annotated[
         bool, typer.Option("--fail-if-lost", help="Exit with 1 if DCPF lost the target.")
     ] = False,
+    record: Annotated[
+        bool, typer.Option("--record", help="Record pictures and all as run.mcap, for Rerun and Foxglove.")
+    ] = False,
+    live: Live = False,
+    port: Port = DEFAULT_PORT,
+    bind: Bind = LOOPBACK,
     as_json: AsJson = False,
 ) -> int:
     """Launch a scenario: one process a camera, the central node and a router; then compare DCPF with CPF."""
@@ -57,13 +67,21 @@ def run(
     # What is wrong with the start or the truth shall be said before anything is written.
     _ = assembly.start, assembly.truth
     _check_by_hand(by_hand or [], assembly, in_process=in_process)
-    with Recorder(folder, chosen) as recorder, progress_bar(f"{chosen.name}: frames", chosen.frames) as bar:
+    if live and in_process:
+        raise typer.BadParameter("with --in-process, nothing goes over the network", param_hint="--live")
+    with ExitStack() as stack:
+        audience = None
+        if live:
+            server = stack.enter_context(page(assembly, chosen.network.router, (bind, port)))
+            audience = partial(wait_for_audience, server)
+        recorder = stack.enter_context(Recorder(folder, chosen, _film(assembly) if record else None))
+        bar = stack.enter_context(progress_bar(f"{chosen.name}: frames", chosen.frames))
         dead: list[str] = []
         if in_process:
             results = Results(chosen)
-            for message in run_in_process(assembly):
-                results.add(message)
+            for message in run_in_process(assembly, watched=record):
                 recorder.add(message)
+                results.add(message)
                 bar(results.frames_done)
         else:
             for node in by_hand or []:
@@ -72,7 +90,7 @@ def run(
             # Zenoh is imported by those who need it: it takes its time.
             from sim.running.launcher import Launch
 
-            launch = Launch(assembly, recorder, bar, by_hand or [], BEGAN_S)
+            launch = Launch(assembly, recorder, bar, by_hand or [], BEGAN_S, audience=audience)
             results, dead = launch.run(), launch.dead
         summary = summarize(results, processes=1 if in_process else chosen.n_processes)
         summary["died"] = dead
@@ -83,6 +101,13 @@ def run(
         _print(summary, chosen, folder)
     lost = bool(summary["lost"]["dcpf"])
     return 1 if dead or (fail_if_lost and lost) else 0
+
+
+def _film(assembly: Assembly) -> Callable[[Path], Film]:
+    # The formats of a recording are for those who record.
+    from sim.recording.film import McapFilm
+
+    return partial(McapFilm, assembly=assembly)
 
 
 def _check_by_hand(names: list[str], assembly: Assembly, *, in_process: bool) -> None:

@@ -15,6 +15,7 @@ from sim.assembly import Assembly
 from sim.pictures.canvas import Image, blank
 from sim.pictures.chart import Chart, Line, mean_known
 from sim.pictures.ground_map import GroundMap
+from sim.pictures.mp4 import require_ffmpeg, write_mp4
 from sim.pictures.overlay import Shown, draw_frame, text_size
 from sim.pictures.theme import COLORS, FAINT, LABELS
 from sim.running.results import Results
@@ -22,8 +23,9 @@ from sim.running.results import Results
 FORMATS: Mapping[str, tuple[int, ...]] = {
     ".webp": (cv2.IMWRITE_WEBP_QUALITY, 80),  # below, still walls flicker in patches
     ".gif": (),
+    ".mp4": (),
 }
-"""File suffixes that a clip can have, and what OpenCV's encoder is told."""
+"""File suffixes that a clip can have, and what OpenCV's encoder is told; MP4 is ffmpeg's."""
 
 _CAMERAS_SHARE = 2 / 3  # of the clip's width, at most
 _TALLEST = 3 / 4  # of the clip's width, without the chart
@@ -82,19 +84,21 @@ def make_clip(
     Args:
         results: The run.
         assembly: Its scenario, put together; gives the pictures.
-        path: A file that ends in .webp (small, many colours) or .gif (shown everywhere).
+        path: A file that ends in .webp (small, many colours), .gif (shown everywhere) or .mp4 (H.264).
         width_px: Width of the clip, at most; its height follows.
         fps: Pictures a second.
         every: Every which frame is shown.
         progress: Called after each picture with how many there are, and will be.
 
     Raises:
-        ValueError: The file's ending is another, or the run has no estimates.
+        ValueError: The file's ending is another, or the run has no estimates, or MP4 is not installed.
         OSError: The file cannot be written.
         SourceError: A camera's pictures cannot be read.
     """
     if path.suffix.lower() not in FORMATS:
         raise ValueError(f"{path}: a clip ends in {' or '.join(FORMATS)}: name it so")
+    if path.suffix.lower() == ".mp4":
+        require_ffmpeg()
     if not results.tracks:
         raise ValueError(f"the run of {results.scenario.name} has no estimates: there is nothing to show")
     frames = range(0, 1 + max(max(track) for track in results.tracks.values()), every)
@@ -195,9 +199,12 @@ def _error_chart(results: Results, width_px: int) -> Chart | None:
 
 
 def _write(pictures: list[Image], path: Path, fps: float) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix.lower() == ".mp4":
+        write_mp4(pictures, path, fps)
+        return
     animation = cv2.Animation(0)
     animation.frames = pictures
     animation.durations = [round(1000 / fps)] * len(pictures)
-    path.parent.mkdir(parents=True, exist_ok=True)
     if not cv2.imwriteanimation(str(path), animation, FORMATS[path.suffix.lower()]):
         raise OSError(f"{path}: the clip cannot be written there: check the folder and the space")

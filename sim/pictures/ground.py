@@ -6,6 +6,7 @@ Pure geometry; the pictures on the screen and the figures on paper draw what is 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -14,6 +15,7 @@ from sim.assembly import Assembly
 from sim.running.results import Results
 
 _MARGIN = 0.08  # of the larger side, around what must be seen
+_RIM_STEPS = 16  # corners along each side of a picture, whose rim a lens may bend
 _ELLIPSE = np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
 
 
@@ -71,6 +73,34 @@ def coverage(
     for camera in cameras:
         seen += camera.contains(camera.project(points)[0])
     return seen.reshape(columns.shape)
+
+
+def field_of_view(camera: Camera, z: float, reach: float) -> Float[np.ndarray, "N 2"]:
+    """The rim of what a camera sees of a horizontal plane, whatever stands between.
+
+    Args:
+        camera: The camera.
+        z: Height of the plane above the floor, metres.
+        reach: Distance from the camera, metres across the ground, beyond which nothing is drawn.
+
+    Returns:
+        Corners in turn, metres.
+    """
+    # rays through the picture's rim: d_world = Rᵀ K⁻¹ [u, v, 1] without the lens's distortion
+    edge = np.linspace(0.0, 1.0, _RIM_STEPS, endpoint=False)
+    zero, one = np.zeros_like(edge), np.ones_like(edge)
+    rim = np.concatenate(
+        [np.stack(side, 1) for side in ((edge, zero), (one, edge), (1 - edge, one), (zero, 1 - edge))]
+    )
+    pixels = rim * [camera.width_px, camera.height_px] - 0.5
+    rays = cv2.undistortPoints(pixels[:, None], camera.K, camera.distortion)[:, 0]
+    across = np.column_stack([rays, np.ones(len(rays))]) @ camera.R
+    # where a ray meets the plane, or the end of the reach if that comes first
+    with np.errstate(divide="ignore"):
+        to_plane = (z - camera.center[2]) / across[:, 2]
+        to_reach = reach / np.linalg.norm(across[:, :2], axis=1)
+    along = np.where(to_plane > 0, np.minimum(to_plane, to_reach), to_reach)
+    return camera.center[:2] + along[:, None] * across[:, :2]
 
 
 def height_of_target(results: Results, assembly: Assembly) -> float:

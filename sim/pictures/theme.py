@@ -11,6 +11,8 @@ COLORS = MappingProxyType({"dcpf": "#D55E00", "cpf": "#0072B2", "single": "#CC79
 LABELS = MappingProxyType({"dcpf": "DCPF", "cpf": "CPF", "single": "single cameras", "truth": "truth"})
 """What legends call them."""
 
+PARTICLE = "#E69F00"
+"""Particles."""
 INK = "#1F1F1F"
 """Text and axes."""
 MUTED = "#6E6E6E"

@@ -12,7 +12,7 @@ import zenoh
 
 from network import codec, keys, sessions
 from network.errors import RefusedMessage
-from network.messages import ControlMessage, EstimateMessage, StatusMessage, TruthMessage
+from network.messages import ControlMessage, EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from network.zenoh import publish
 from sim.assembly import Assembly
 from sim.running.children import Children, RunFailed
@@ -29,6 +29,8 @@ STUCK_DEADLINES = 4
 LEAD_S = 0.2
 """In real time, frame 0 begins this long after the order to start."""
 
+Heard = EstimateMessage | StatusMessage | PreviewMessage
+"""What nodes tell."""
 Progress = Callable[[int], None]
 """Told the number of frames that are done."""
 
@@ -43,6 +45,8 @@ class Launch:
         progress: Progress,
         by_hand: Sequence[str],
         began: float,
+        *,
+        audience: Callable[[], None] | None = None,
     ) -> None:
         """A run that has not begun.
 
@@ -52,8 +56,11 @@ class Launch:
             progress: Told how far it is.
             by_hand: Nodes that somebody else starts.
             began: When the user's command began, on the monotonic clock.
+            audience: Waits for those who look on, if there are any; the frames start when it is back.
         """
         self._began = began
+        self._audience = audience
+        self._watched = audience is not None or recorder.filming
         self.results = Results(assembly.scenario)
         self.dead: list[str] = []
         self._assembly, self._recorder, self._progress, self._by_hand = assembly, recorder, progress, by_hand
@@ -91,6 +98,10 @@ class Launch:
             stack.callback(publish, session, self._assembly.scenario.name, ControlMessage("stop"))
             self._listen(session)
             self._wait_until_ready(children)
+            if self._audience is not None:
+                waiting = time.monotonic()
+                self._audience()
+                self._began += time.monotonic() - waiting  # whose time it is not
             self._start(session)
             started = self._last_heard = time.monotonic()
             for message in self._messages(children):
@@ -108,6 +119,8 @@ class Launch:
         hear = zenoh.handlers.Callback(self._heard.put, indirect=False)
         session.declare_subscriber(keys.estimate(run), hear)
         session.declare_subscriber(keys.status(run), hear)
+        if self._recorder.filming:
+            session.declare_subscriber(keys.preview(run), hear)
         session.liveliness().declare_subscriber(keys.alive(run), hear, history=True)
 
     def _wait_until_ready(self, children: Children) -> None:
@@ -131,7 +144,7 @@ class Launch:
         start_time_s = time.time() + LEAD_S if realtime else None
         publish(session, self._assembly.scenario.name, ControlMessage("start", start_time_s))
 
-    def _messages(self, children: Children) -> Iterator[EstimateMessage | StatusMessage | None]:
+    def _messages(self, children: Children) -> Iterator[Heard | None]:
         """What the nodes tell, until all have told their last, have died, or are heard of no more."""
         working, ended = set(self._nodes), dict[str, int]()
         while working:
@@ -169,7 +182,7 @@ class Launch:
         self._recorder.forget(name)
         _log.error("node %s %s; the others go on", name, what)
 
-    def _next(self) -> EstimateMessage | StatusMessage | None:
+    def _next(self) -> Heard | None:
         """The next valid message, None if there is none for a while."""
         try:
             sample = self._heard.get(timeout=IDLE_S)
@@ -199,7 +212,7 @@ class Launch:
             self._absent_since[node] = time.monotonic()
         self._recorder.event("seen" if here else "lost", node, frame=self._frames_done)
 
-    def _take(self, message: EstimateMessage | StatusMessage | None, session: zenoh.Session) -> None:
+    def _take(self, message: Heard | None, session: zenoh.Session) -> None:
         if message is None:
             if self._assembly.scenario.pace == "realtime":
                 self._tell_truth(session, min(self._truth_next + 1, self._frames_done))
@@ -209,6 +222,8 @@ class Launch:
         if isinstance(message, EstimateMessage) and message.frame >= self._frames_done:
             self._frames_done = message.frame + 1
             self._progress(self._frames_done)
+            if self._watched:
+                self._tell_truth(session, self._frames_done)
 
     def _record_truth(self) -> None:
         """Records the truth of frames that are done and not told: those of an interrupted run, in short."""
@@ -222,7 +237,7 @@ class Launch:
         """Publishes and records the truth of frames that are done.
 
         Working out what each camera sees takes some time: in real time it is done when nothing else is, in
-        lockstep, where every processor is busy to the end, after the frames.
+        lockstep, where every processor is busy to the end, after the frames, unless somebody looks on.
         """
         while self._truth_next < until:
             message: TruthMessage | None = self._assembly.truth_message(self._truth_next)
@@ -233,15 +248,17 @@ class Launch:
                 self._recorder.add(message)
 
 
-def _decode(node: str, kind: str, data: bytes) -> EstimateMessage | StatusMessage:
+def _decode(node: str, kind: str, data: bytes) -> Heard:
     """What a node tells, under a key of its own.
 
     Raises:
         RefusedMessage: It is something else, or of somebody else.
     """
-    message: EstimateMessage | StatusMessage
+    message: Heard
     if kind == "estimate":
         message = codec.decode_public(EstimateMessage, data)
+    elif kind == "preview":
+        message = codec.decode_preview(data)
     else:
         message = codec.decode_public(StatusMessage, data)
     if message.node != node:

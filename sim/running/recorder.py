@@ -1,15 +1,15 @@
 """The folder of a run: written as the run goes, readable at any moment, the summary whole or not at all."""
 
 import json
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, Protocol, TextIO, runtime_checkable
 
 from network.codec import decode_public, encode_public
 from network.errors import RefusedMessage
-from network.messages import EstimateMessage, StatusMessage, TruthMessage
+from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from sim.running.results import Results, Track
 from sim.scenario.document import dump
 from sim.scenario.loading import load_scenario
@@ -39,20 +39,41 @@ def expected_tracks(scenario: Scenario) -> set[Track]:
     return tracks
 
 
+FILM = "run.mcap"
+"""The recording with pictures, in the folder of a run."""
+
+
+@runtime_checkable
+class Film(Protocol):
+    """Records a run with its pictures as it goes; raises OSError where it cannot."""
+
+    def add(self, message: EstimateMessage | TruthMessage | StatusMessage | PreviewMessage) -> None:
+        """Records what a node, or the world, has told."""
+
+    def event(self, event: str, node: str, details: dict[str, Any]) -> None:
+        """Records that something happened to a node."""
+
+    def close(self) -> None:
+        """Ends it; a second time nothing happens."""
+
+
 class Recorder:
     """Writes a run into its folder; estimates in one order, whatever order they come in."""
 
-    def __init__(self, folder: Path, scenario: Scenario) -> None:
+    def __init__(self, folder: Path, scenario: Scenario, film: Callable[[Path], Film] | None = None) -> None:
         """Makes the folder and begins its files.
 
         Args:
             folder: Where; an earlier run in it is replaced.
             scenario: As run.
+            film: Begins a recording with pictures in a file, if there is to be one.
 
         Raises:
             RecordingError: It cannot be written.
         """
         self.folder = folder
+        self._film: Film | None = None
+        self._files: dict[str, TextIO] = {}
         self._expected = expected_tracks(scenario)
         self._waiting: dict[int, dict[Track, EstimateMessage]] = {}
         self._latest: dict[Track, int] = {}
@@ -60,14 +81,15 @@ class Recorder:
         self._skips = scenario.pace == "realtime"
         try:
             (folder / "logs").mkdir(parents=True, exist_ok=True)
-            with suppress(FileNotFoundError):
-                (folder / "summary.json").unlink()
+            for earlier in ("summary.json", FILM):
+                (folder / earlier).unlink(missing_ok=True)
             dump(_plain(scenario), folder / "scenario.yaml")
-            self._files: dict[str, TextIO] = {
-                name: (folder / f"{name}.jsonl").open("w", encoding="utf-8")
-                for name in ("estimates", "truth", "events")
-            }
+            for name in ("estimates", "truth", "events"):
+                self._files[name] = (folder / f"{name}.jsonl").open("w", encoding="utf-8")
+            if film is not None:
+                self._film = film(folder / FILM)
         except OSError as error:
+            self.close()
             raise _cannot_write(folder, error) from error
 
     def __enter__(self) -> "Recorder":
@@ -76,12 +98,20 @@ class Recorder:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def add(self, message: EstimateMessage | TruthMessage | StatusMessage) -> None:
+    @property
+    def filming(self) -> bool:
+        """Whether pictures are wanted."""
+        return self._film is not None
+
+    def add(self, message: EstimateMessage | TruthMessage | StatusMessage | PreviewMessage) -> None:
         """Records what a node, or the world, has told.
 
         Raises:
             RecordingError: The disk is full, or the folder gone.
         """
+        if self._film is not None:
+            with self._writing():
+                self._film.add(message)
         if isinstance(message, TruthMessage):
             self._write("truth", encode_public(message).decode())
         elif isinstance(message, EstimateMessage):
@@ -93,6 +123,9 @@ class Recorder:
     def event(self, event: str, node: str, **details: Any) -> None:
         """Records that something happened to a node."""
         self._write("events", json.dumps({"event": event, "node": node, **details}))
+        if self._film is not None:
+            with self._writing():
+                self._film.event(event, node, details)
 
     def forget(self, node: str) -> None:
         """A node is gone: nobody waits for its estimates any more."""
@@ -107,11 +140,11 @@ class Recorder:
         """
         self._write_frames(sorted(self._waiting))
         part = self.folder / "summary.json.part"
-        try:
+        with self._writing():
+            if self._film is not None:
+                self._film.close()
             part.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
             part.replace(self.folder / "summary.json")
-        except OSError as error:
-            raise _cannot_write(self.folder, error) from error
 
     def close(self) -> None:
         """Writes what is left and closes the files."""
@@ -120,6 +153,9 @@ class Recorder:
         for file in self._files.values():
             with suppress(OSError):
                 file.close()
+        if self._film is not None:
+            with suppress(OSError):
+                self._film.close()
 
     def _write_complete(self) -> None:
         """Writes the next frames of which everything has come, or will not come any more."""
@@ -141,9 +177,14 @@ class Recorder:
 
     def _write(self, name: str, line: str) -> None:
         file = self._files[name]
-        try:
+        with self._writing():
             file.write(line + "\n")
             file.flush()
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
         except (OSError, ValueError) as error:
             raise _cannot_write(self.folder, error) from error
 

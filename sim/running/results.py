@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from network.messages import EstimateMessage, StatusMessage, TruthMessage
+from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
+from sim.metrics.loss import losses
+from sim.metrics.sets import gospa, ospa
 from sim.running.metrics import (
     LOST_DIAGONALS,
     LOST_ERROR,
@@ -50,15 +52,15 @@ class Results:
         """Frames of which something is known."""
         return 1 + max((max(found) for found in self.tracks.values()), default=-1)
 
-    def add(self, message: EstimateMessage | TruthMessage | StatusMessage) -> None:
-        """Takes what a node, or the world, has told."""
+    def add(self, message: EstimateMessage | TruthMessage | StatusMessage | PreviewMessage) -> None:
+        """Takes what a node, or the world, has told; pictures are no results."""
         match message:
             case EstimateMessage():
                 self.tracks.setdefault((message.estimator, message.node), {})[message.frame] = message
             case TruthMessage():
                 self.truth[message.frame] = message
             case StatusMessage(state="running"):
-                self.first_statuses[message.node] = message
+                self.first_statuses.setdefault(message.node, message)
             case StatusMessage(state="done" | "failed"):
                 self.statuses[message.node] = message
 
@@ -151,6 +153,10 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
             "dcpf": _anees(results, list(dcpf.values())),
             "cpf": _anees(results, [cpf] if cpf else []),
         },
+        "tracking": {
+            "dcpf": _tracking(results, list(dcpf.values())),
+            "cpf": _tracking(results, [cpf] if cpf else []),
+        },
         "network": _network(results),
         "fusion": _fusion(results),
         **_array(results),
@@ -196,6 +202,28 @@ def _anees(results: Results, tracks: list[Track]) -> float | None:
     each = np.array([anees(results.means(t)[1:], results.covariances(t)[1:], truth[1:]) for t in tracks])
     known = each[~np.isnan(each)]
     return _number(float(known.mean())) if known.size else None
+
+
+def _tracking(results: Results, tracks: list[Track]) -> dict[str, float | None] | None:
+    """The mean OSPA and GOSPA of an estimator's nodes, its losses of the target, and how long they lasted."""
+    truth = results.true_states()
+    if truth is None or not tracks:
+        return None
+    # Where nobody knows the truth, there is nothing to be far from.
+    there = np.isfinite(truth[1:]).all(axis=1)
+    known = [position_errors(results.means(track), truth)[1:][there] for track in tracks]
+    cutoff = results.lost_error
+    each = [loss for errors in known for loss in losses(errors, cutoff)]
+    found_after = [loss.found - loss.first for loss in each if loss.found is not None]
+    lengths = {
+        "ospa": float(np.mean([ospa(errors, cutoff) for errors in known])),
+        "gospa": float(np.sqrt(np.mean([gospa(errors, cutoff) ** 2 for errors in known]))),
+    }
+    return {
+        **in_unit(lengths, results.scenario.target.unit),
+        "losses_per_node": len(each) / len(known),
+        "reacquired_after_s": float(np.mean(found_after)) / results.scenario.rate_hz if found_after else None,
+    }
 
 
 def _network(results: Results) -> dict[str, Any]:

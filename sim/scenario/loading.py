@@ -12,7 +12,7 @@ from nodes.sources import SourceError, VideoSource
 from sim.footage import FootageError, locate
 from sim.scenario.cameras import CameraOptions
 from sim.scenario.complaints import validate
-from sim.scenario.document import merge_defaults, read_document
+from sim.scenario.document import Document, merge_defaults, read_document
 from sim.scenario.edges import with_edges
 from sim.scenario.model import Scenario
 from sim.scenario.parsing import ScenarioError
@@ -37,7 +37,18 @@ def load_scenario(
     Raises:
         ScenarioError: The file, or one that it names, is not as it must be.
     """
-    document = read_document(path)
+    return resolve(read_document(path), overrides, rendered=rendered)
+
+
+def resolve(
+    document: Document, overrides: Iterable[tuple[str, str]] = (), *, rendered: bool = True
+) -> Scenario:
+    """Resolves a scenario that has been read, as `load_scenario` does.
+
+    Raises:
+        ScenarioError: It, or a file that it names, is not as it must be.
+    """
+    path = document.path
     for key, value in overrides:
         document = document.with_value(key, value)
     document = merge_defaults(document, preset_defaults(document.data))

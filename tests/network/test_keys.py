@@ -6,7 +6,7 @@ from network import keys
 
 
 @pytest.mark.parametrize(
-    "build", [keys.estimate, keys.consensus, keys.pixels, keys.confirm, keys.status, keys.alive]
+    "build", [keys.estimate, keys.consensus, keys.pixels, keys.confirm, keys.status, keys.preview, keys.alive]
 )
 def test_keys_of_a_node_name_it(build):
     key = build("scene1", "C3")

@@ -6,6 +6,7 @@ import pytest
 
 from sim.assembly import Assembly
 from sim.running.in_process import run_in_process
+from sim.running.results import Results, summarize
 from sim.scenario.loading import load_scenario
 
 SMALL = """
@@ -50,5 +51,18 @@ def told():
 
     def run(path, *overrides):
         return list(run_in_process(Assembly(load_scenario(path, overrides))))
+
+    return run
+
+
+@pytest.fixture
+def summary_of(told):
+    """Runs a scenario file in process and returns its summary."""
+
+    def run(path, *overrides):
+        results = Results(load_scenario(path, overrides))
+        for message in told(path, *overrides):
+            results.add(message)
+        return summarize(results, processes=1)
 
     return run

@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 from network.messages import EstimateMessage, TruthMessage
 from sim.assembly import Assembly
 from sim.commands.app import app
+from sim.experiments.found.figures import compare
 from sim.pictures.clip import make_clip
-from sim.running.experiment import compare, run_once
 from sim.running.metrics import LOST_DIAGONALS
 from sim.running.recorder import Recorder, read_run
 from sim.running.results import Results, length, summarize
@@ -115,12 +115,12 @@ def test_lost_is_outside_the_circle_around_the_true_box(one):
     )
 
 
-def test_without_a_central_filter_there_is_no_ratio(one):
-    summary = run_once(one, [("baselines.cpf", "false")])
+def test_without_a_central_filter_there_is_no_ratio(one, summary_of):
+    summary = summary_of(one, ("baselines.cpf", "false"))
 
     assert summary["ratio_dcpf_cpf"] is None
     assert summary["rmse_px"]["cpf"] is None
-    figures = compare([summary, summary])
+    figures = compare([summary, summary], 2)
     assert figures["rmse_m"] is None
     assert figures["rmse_px"]["dcpf"]["median"] == summary["rmse_px"]["dcpf"]
     assert figures["unit"] == "px"

@@ -294,8 +294,8 @@ def test_a_clip_of_a_run_that_was_cut_off_without_truth_ends_there(tmp_path):
 
 def test_a_clip_that_cannot_be_is_refused(tmp_path):
     results, assembly = run()
-    with pytest.raises(ValueError, match=r"clip\.mp4: a clip ends in \.webp or \.gif: name it so"):
-        make_clip(results, assembly, tmp_path / "clip.mp4", progress=lambda *_: None)
+    with pytest.raises(ValueError, match=r"clip\.avi: a clip ends in \.webp or \.gif or \.mp4: name it so"):
+        make_clip(results, assembly, tmp_path / "clip.avi", progress=lambda *_: None)
     with pytest.raises(ValueError, match="has no estimates"):
         make_clip(Results(results.scenario), assembly, tmp_path / "clip.webp", progress=lambda *_: None)
     (tmp_path / "taken.webp").mkdir()

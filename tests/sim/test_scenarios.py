@@ -12,7 +12,6 @@ from network.messages import EstimateMessage
 from sim.assembly import Assembly
 from sim.commands.inspect import scenario_schema
 from sim.footage import FootageError, locate
-from sim.running.experiment import run_once
 from sim.running.in_process import run_in_process
 from sim.scenario.document import read_document
 from sim.scenario.loading import load_scenario
@@ -125,8 +124,8 @@ WALKER = [("target.object", "null"), ("target.person", "walker"), ("target.size_
     ],
     ids=["face", "face-robust", "cup", "walker"],
 )
-def test_the_papers_trackers_follow_their_targets(name, overrides, limit):
-    summary = run_once(FOLDER / f"{name}.yaml", [*overrides, ("seed", "3")])
+def test_the_papers_trackers_follow_their_targets(summary_of, name, overrides, limit):
+    summary = summary_of(FOLDER / f"{name}.yaml", *overrides, ("seed", "3"))
 
     for rmse in (summary["rmse_px"]["dcpf"], summary["rmse_px"]["single"]["C1"]):
         assert rmse < limit

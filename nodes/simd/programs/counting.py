@@ -108,10 +108,13 @@ def count_in_columns(
 
 def count_side_by_side(
     array: ProcessorArray,
+    histogram: Sequence[Word],
     memory: ExternalMemory,
     corners: Int[np.ndarray, "N 2"],
     size_px: tuple[int, int],
-    n_bins: int,
+    sampling: tuple[Word, Word, Word],
+    *,
+    first_bin: int = 0,
 ) -> Int[np.ndarray, "N B"]:
     """Algorithm 1: each element counts one column of a region, then neighbours add up.
 
@@ -119,10 +122,12 @@ def count_side_by_side(
 
     Args:
         array: The processor.
+        histogram: A word for each bin that is counted.
         memory: Bins of the pixels.
         corners: Left and top of each region.
         size_px: Width r_x and height r_y.
-        n_bins: Bins to count.
+        sampling: Words for the column, the row and the pixel of a sample.
+        first_bin: Of the histogram.
 
     Returns:
         The histograms, as the digital output processor takes them from the last element of each region.
@@ -130,14 +135,13 @@ def count_side_by_side(
     width, height = size_px
     per_pass = array.n // width
     n_passes = -(-len(corners) // per_pass)
-    # Regions that fill the last pass up repeat the last one.
+    # Places that are left over in the last pass repeat the last region.
     which = np.minimum(np.arange(n_passes * per_pass), len(corners) - 1).reshape(n_passes, per_pass)
     lines = np.repeat(corners[which], width, axis=1)
-    used = slice(0, per_pass * width)
-    histogram = [array.word("Histograms") for _ in range(n_bins)]
-    place, column, row, pixel = array.word(), array.word(), array.word(), array.word("Video line buffers")
+    used, last = slice(0, per_pass * width), slice(width - 1, per_pass * width, width)
+    column, row, pixel = sampling
     counts = []
-    with array.using(place, column, row, pixel, *histogram):
+    with array.using(array.word()) as (place,):
         array.input(place, np.arange(array.n) % width)
         for index in array.repeat(n_passes):
             array.input(column, lines[np.squeeze(index)][..., 0])
@@ -148,7 +152,7 @@ def count_side_by_side(
             for _ in range(height):
                 # read position (x + i mod r_x, y + j), update the column histogram
                 array.fetch(pixel, memory, column, row, used)
-                for bin_, word in enumerate(histogram):
+                for bin_, word in enumerate(histogram, start=first_bin):
                     array.add(word, word, 1, when=array.equal(pixel, bin_))
                 array.add(row, row, 1)
             for k in range(1, width):
@@ -156,6 +160,43 @@ def count_side_by_side(
                 turn = array.equal(place, k)
                 for word in histogram:
                     array.add(word, word, array.neighbour(word, -1), when=turn)
-            last = slice(width - 1, per_pass * width, width)
             counts.append(np.stack([array.collect(word, last) for word in histogram], axis=-1))
-    return np.concatenate([each.reshape(-1, n_bins) for each in counts])[: len(corners)]
+    return np.concatenate([each.reshape(-1, len(histogram)) for each in counts])[: len(corners)]
+
+
+def count_in_passes(
+    array: ProcessorArray,
+    histogram: Sequence[Word],
+    memory: ExternalMemory,
+    center: tuple[Word, Word],
+    fraction_bits: int,
+    sampling: tuple[Word, Word, Word],
+    counted: Region,
+    active: slice,
+    *,
+    first_bin: int = 0,
+) -> None:
+    """Algorithm 1 in the place of `count_in_columns`, for plain rectangles.
+
+    The output processor takes the corners out and the histograms too, the input processor brings the regions'
+    columns to their places and the histograms to the elements of the particles.
+    """
+    corners = []
+    with array.using(array.word()) as (corner,):
+        for middle, size in zip(center, counted.size_px, strict=True):
+            array.shift_right(corner, middle, fraction_bits)
+            array.subtract(corner, corner, size // 2)
+            corners.append(array.collect(corner, active))
+    counts = count_side_by_side(
+        array,
+        histogram,
+        memory,
+        np.stack(corners, axis=1).astype(int),
+        counted.size_px,
+        sampling,
+        first_bin=first_bin,
+    )
+    for word, of_bin in zip(histogram, counts.T, strict=True):
+        lanes = np.zeros(array.n, int)
+        lanes[active] = of_bin
+        array.input(word, lanes)

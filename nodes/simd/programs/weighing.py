@@ -127,7 +127,8 @@ def likelihood(array: ProcessorArray, weight: Word, coefficient: Word, perfect: 
             array.multiply(exponent, coefficient, steepness)
         else:
             one, full = 1 << options.number_bits, (1 << options.number_bits) - 1
-            factor = round(steepness * 2.0 ** (options.number_bits - integer_bits) * one)
+            # so steep that it would not fit, a likelihood is 0 in all but the best places anyway
+            factor = min(round(steepness * 2.0 ** (options.number_bits - integer_bits) * one), one * one - 1)
             array.multiply(
                 wide, coefficient, factor, b_words=2 * options.number_words, drop=options.number_words
             )

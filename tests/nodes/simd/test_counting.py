@@ -43,8 +43,10 @@ def in_columns(memory, corners, counted, *, batching=True, n_words=N_BINS, first
 
 def side_by_side(memory, corners, size_px, *, batching=True):
     array = ProcessorArray(SimdOptions(processing_elements=48), batching=batching)
+    histogram = [array.word() for _ in range(N_BINS)]
+    sampling = (array.word(), array.word(), array.word())
     with array.step("count") as cost:
-        return count_side_by_side(array, memory, corners, size_px, N_BINS), cost
+        return count_side_by_side(array, histogram, memory, corners, size_px, sampling), cost
 
 
 def by_numpy(memory, corners, counted):

@@ -8,7 +8,6 @@ import socket
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import pytest
@@ -24,20 +23,11 @@ def free_port():
         return probe.getsockname()[1]
 
 
-def wait_until(condition, limit_s=LIMIT_S):
-    """Waits until something holds, and tells whether it did in time."""
-    limit = time.monotonic() + limit_s
-    while not condition():
-        if time.monotonic() > limit:
-            return False
-        time.sleep(0.02)
-    return True
-
-
 class Launched:
     """A run, from its command to its last process, and the processes beside it."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, wait_until):
+        self.wait_until = wait_until
         self.out = folder / "run"
         self.router = f"tcp/127.0.0.1:{free_port()}"
         # Sockets need a short path; a folder of their own shows whether any is left.
@@ -99,7 +89,9 @@ class Launched:
 
     def reaches(self, frame):
         """Waits until everything of a frame is recorded."""
-        return wait_until(lambda: any(json.loads(each)["frame"] > frame for each in self.lines("estimates")))
+        return self.wait_until(
+            lambda: any(json.loads(each)["frame"] > frame for each in self.lines("estimates"))
+        )
 
     def end(self, limit_s=LIMIT_S):
         """Waits for the end: exit code, stdout and stderr."""
@@ -108,7 +100,7 @@ class Launched:
 
     def is_gone(self, limit_s=10.0):
         """Waits until no process and no socket is left."""
-        return wait_until(lambda: not self.processes() and not list(self.sockets.iterdir()), limit_s)
+        return self.wait_until(lambda: not self.processes() and not list(self.sockets.iterdir()), limit_s)
 
     def close(self):
         """Ends what is left of it, by its ids."""
@@ -123,9 +115,9 @@ class Launched:
 
 
 @pytest.fixture
-def launched(tmp_path):
+def launched(tmp_path, wait_until):
     """A run that can be started."""
-    run = Launched(tmp_path)
+    run = Launched(tmp_path, wait_until)
     yield run
     run.close()
 

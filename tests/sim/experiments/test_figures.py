@@ -1,10 +1,8 @@
-"""Many runs: the same whatever the number of jobs, and their figures by hand."""
+"""The figures of many runs, by hand."""
 
 import pytest
 
-from sim.running.experiment import compare, run_many, run_once
-
-FAST = [("frames", "3"), ("filter.n_particles", "10")]
+from sim.experiments.found.figures import compare
 
 
 def summary(dcpf, cpf, singles, *, lost=False, anees=1.0):
@@ -14,6 +12,7 @@ def summary(dcpf, cpf, singles, *, lost=False, anees=1.0):
         "ratio_dcpf_cpf": dcpf / cpf if cpf else None,
         "lost": {"dcpf": lost, "cpf": False},
         "disagreement_m": 0.01,
+        "tracking": {"dcpf": {"ospa_m": dcpf, "reacquired_after_s": None}, "cpf": None},
         "anees": {"dcpf": anees, "cpf": None},
         "network": {"bytes_per_frame": {"dcpf": 6144.0, "cpf": 3686496.0}},
         "fusion": {"indefinite_local_fraction": 0.0},
@@ -27,7 +26,7 @@ def test_figures_are_medians_with_the_best_and_the_worst():
         summary(0.2, 0.4, {"A": 0.8, "B": 0.9}, lost=True),
     ]
 
-    figures = compare(runs)
+    figures = compare(runs, 2)
 
     assert figures["runs"] == 3
     assert figures["rmse_m"]["dcpf"] == {"median": 0.2, "min": 0.1, "max": 0.3}
@@ -38,27 +37,18 @@ def test_figures_are_medians_with_the_best_and_the_worst():
     assert figures["ratio_dcpf_best_single"] == pytest.approx({"median": 0.5, "min": 0.25, "max": 1.0})
     assert figures["lost_fraction"] == {"dcpf": pytest.approx(1 / 3), "cpf": 0}
     assert figures["anees"]["cpf"] is None
+    assert figures["mean_rmse_m"]["dcpf"]["mean"] == pytest.approx(0.2)
+    assert figures["mean_rmse_m"]["dcpf"]["deviation"] == pytest.approx(0.1)
+    assert figures["tracking"]["dcpf"]["ospa_m"] == {"median": 0.2, "min": 0.1, "max": 0.3}
+    assert figures["tracking"]["dcpf"]["reacquired_after_s"] is None
+    assert figures["tracking"]["cpf"] is None
     assert figures["bytes_per_frame"]["dcpf"] == 6144
 
 
 def test_without_baselines_or_truth_there_is_nothing_to_compare():
-    figures = compare([summary(0.1, None, {})])
+    figures = compare([summary(0.1, None, {})], 2)
 
     assert figures["rmse_m"]["cpf"] is None
     assert figures["rmse_m"]["best_single"] is None
     assert figures["ratio_dcpf_cpf"] is None
     assert figures["ratio_dcpf_best_single"] is None
-
-
-def test_runs_are_the_same_and_in_order_whatever_the_number_of_jobs(small):
-    one = [_but_timing(run) for run in run_many([small], FAST, [3, 1, 2], 1)]
-    two = [_but_timing(run) for run in run_many([small], FAST, [3, 1, 2], 2)]
-
-    assert [run["seed"] for run in one] == [3, 1, 2]
-    assert one == two
-    assert one[1] == _but_timing(run_once(small, [*FAST, ("seed", "1")]))
-    assert one[0]["rmse_m"] != one[1]["rmse_m"]
-
-
-def _but_timing(run):
-    return {key: value for key, value in run.items() if key != "timing"}

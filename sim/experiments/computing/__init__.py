@@ -1,0 +1,1 @@
+"""What an experiment computes, where, and where it is kept."""

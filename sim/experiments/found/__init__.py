@@ -1,0 +1,1 @@
+"""What an experiment has found: arrays, figures, claims, files."""

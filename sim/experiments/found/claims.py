@@ -1,0 +1,112 @@
+"""Whether the figures show what they should: a sentence for each claim, with what was measured."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from sim.experiments.found.findings import Findings, GroupFindings, Track
+from sim.experiments.options import Claim, FlatClaim, NoisierClaim, WithinClaim
+from sim.metrics.intervals import ratio_interval
+
+FLAT = 0.25
+"""DCPF counts as flat if its mean error changes by at most this part of what the single cameras' does."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A claim held against what was measured.
+
+    Attributes:
+        study: The study.
+        label: Scenario and preset.
+        claim: Which claim.
+        holds: Whether it holds.
+        text: What was measured, and why it does not hold if it does not.
+    """
+
+    study: str
+    label: str
+    claim: str
+    holds: bool
+    text: str
+
+
+def judge(findings: Findings) -> list[Verdict]:
+    """Every claim of an experiment, for each scenario and preset."""
+    verdicts = []
+    for name, study in findings.options.studies.items():
+        for label in findings.labels(name):
+            groups = findings.study(name, label)
+            for claim in study.claims:
+                holds, text = _measure(claim, groups)
+                why = "" if holds or not claim.otherwise else f" Why: {' '.join(claim.otherwise.split())}"
+                verdicts.append(Verdict(name, label, claim.kind, holds, text + why))
+    return verdicts
+
+
+def _measure(claim: Claim, groups: Sequence[GroupFindings]) -> tuple[bool, str]:
+    match claim:
+        case FlatClaim():
+            return _flat(groups)
+        case WithinClaim():
+            return _within(groups, claim)
+        case NoisierClaim():
+            return _noisier(groups)
+
+
+def _flat(groups: Sequence[GroupFindings]) -> tuple[bool, str]:
+    key, unit = groups[0].group.settings[0][0], groups[0].unit
+    ours = _range([float(group.rmse("dcpf").mean()) for group in groups])
+    best = _range([float(group.rmse("single").mean()) for group in groups])
+    each = np.array([group.node_rmse("single").mean(axis=0) for group in groups])
+    single = float(np.mean(each.max(axis=0) - each.min(axis=0)))
+    text = (
+        f"over {key}, DCPF's mean RMSE changes by {ours:.3f} {unit}, a single camera's by {single:.3f} {unit}"
+        f" in the mean (the best one's by {best:.3f} {unit})."
+    )
+    return ours <= FLAT * single, text
+
+
+def _within(groups: Sequence[GroupFindings], claim: WithinClaim) -> tuple[bool, str]:
+    key = groups[0].group.settings[0][0]
+    last = [group for group in groups if float(group.settings[key]) >= claim.from_value]
+    if not last:
+        return False, f"{key} has no value from {claim.from_value:g} on."
+    ratios = {group: ratio_interval(group.rmse("dcpf"), group.rmse("cpf")) for group in last}
+    worst = max(ratios, key=lambda group: ratios[group].value)
+    found = ratios[worst]
+    where = ", ".join(f"{name} = {value}" for name, value in worst.group.settings)
+    text = (
+        f"from {key} = {claim.from_value:g} on, DCPF's mean RMSE is at most {found.value:.2f} times CPF's"
+        f" (95%: {found.low:.2f} to {found.high:.2f}, at {where})."
+    )
+    return found.value <= 1 + claim.percent / 100, text
+
+
+def _noisier(groups: Sequence[GroupFindings]) -> tuple[bool, str]:
+    key, unit = groups[0].group.settings[1][0], groups[0].unit
+    few, *_, many = list(dict.fromkeys(group.settings[key] for group in groups))
+    deviation = {value: _deviation(groups, key, value, "dcpf") for value in (few, many)}
+    text = (
+        f"DCPF's RMSE deviates from run to run by {deviation[few]:.4f} {unit} with {key} = {few}, by"
+        f" {deviation[many]:.4f} {unit} with {many}."
+    )
+    return deviation[few] > deviation[many], text
+
+
+def _deviation(groups: Sequence[GroupFindings], key: str, value: str, track: Track) -> float:
+    """The standard deviation over runs, pooled over the other settings."""
+    runs: list[Float[np.ndarray, " R"]] = [g.rmse(track) for g in groups if g.settings[key] == value]
+    return float(np.sqrt(np.mean([np.var(each, ddof=1) if len(each) > 1 else 0.0 for each in runs])))
+
+
+def _range(values: Sequence[float]) -> float:
+    return max(values) - min(values)
+
+
+def as_data(verdicts: Sequence[Verdict]) -> list[Mapping[str, Any]]:
+    """Verdicts as plain data."""
+    return [{name: getattr(each, name) for name in Verdict.__slots__} for each in verdicts]

@@ -1,0 +1,1 @@
+"""The field's figures, as pure mathematics: sets, consistency, loss, bounds, intervals."""

@@ -1,0 +1,210 @@
+"""The panels of an experiment's figures: error over a key, over bytes, over time, and paths.
+
+Imports matplotlib: what only runs scenarios does not import this module.
+"""
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from sim.experiments.found.findings import GroupFindings, Track
+from sim.metrics.intervals import Interval, mean_interval
+from sim.pictures.plots import log_axis
+from sim.pictures.theme import COLORS, LABELS, MUTED, PAPER
+
+AXES = {
+    "filter.model_update.alpha": "model update α (Eq. 4)",
+    "network.iterations": "rounds of consensus t",
+    "filter.n_particles": "particles n",
+    "network.graph": "communication graph",
+    "cameras": "cameras",
+}
+"""What axes call the keys that are swept most; others go by their own name."""
+_SHORT = {"filter.n_particles": "n", "network.iterations": "t", "filter.model_update.alpha": "α"}
+_NAMES: dict[Track, str] = {
+    "dcpf": LABELS["dcpf"],
+    "cpf": LABELS["cpf"],
+    "single": "best single camera",
+    "coded": "CPF, JPEG",
+}
+_TINTS: dict[Track, str] = {
+    "dcpf": COLORS["dcpf"],
+    "cpf": COLORS["cpf"],
+    "single": COLORS["single"],
+    "coded": "#56B4E9",
+}
+_MOST_TICKS = 9
+_DASHES = ("-", "--", ":", "-.")
+
+
+def draw_error(axes: Axes, groups: Sequence[GroupFindings]) -> None:
+    """Mean RMSE over the first swept key in a band of 95% confidence, a dash for each value of the others."""
+    key, *others = (name for name, _ in groups[0].group.settings)
+    values = list(dict.fromkeys(group.settings[key] for group in groups))
+    numbers, is_number = _numbers(values)
+    combinations = list(
+        product(*(dict.fromkeys(group.settings[name] for group in groups) for name in others))
+    )
+    for dash, combination in zip(_DASHES * len(combinations), combinations, strict=False):
+        line = [g for g in groups if tuple(g.settings[name] for name in others) == combination]
+        label = "".join(
+            f", {_short(name)} = {value}" for name, value in zip(others, combination, strict=True)
+        )
+        _draw_cameras(axes, numbers, line)
+        for track in ("single", "cpf", "dcpf"):
+            if line[0].has(track):
+                intervals = [mean_interval(group.rmse(track)) for group in line]
+                _draw_line(axes, numbers, intervals, _TINTS[track], _NAMES[track] + label, dash)
+    if not is_number or len(values) <= _MOST_TICKS:
+        axes.set_xticks(numbers, values)
+    if not is_number:
+        axes.set_xlim(-0.5, len(values) - 0.5)
+    axes.set(xlabel=AXES.get(key, key), ylabel=_rmse_label(groups))
+    log_axis(axes)
+
+
+def draw_paths(axes: Axes, groups: Sequence[GroupFindings]) -> None:
+    """The ground from above: each run's deviation from its own truth, laid on the mean true path.
+
+    People walk a little differently with every seed; so the paths of different runs can be compared.
+    """
+    (group,) = groups[:1]
+    truth = group.truth()[:, :, :2]
+    middle = truth.mean(axis=0)
+    axes.plot(*middle.T, color=COLORS["truth"], linewidth=4.0, alpha=0.3, label=LABELS["truth"])
+    widths: dict[Track, float] = {"single": 1.4, "cpf": 1.8, "dcpf": 1.0}
+    for track, width in widths.items():
+        if not group.has(track):
+            continue
+        deviation = group.paths(track)[:, :, :2] - truth
+        for run in deviation:
+            axes.plot(*(middle + run).T, color=_TINTS[track], linewidth=0.5, alpha=0.5)
+        mean = middle + np.ma.masked_invalid(deviation).mean(axis=0).filled(np.nan)
+        axes.plot(*mean.T, color=_TINTS[track], linewidth=width, label=_NAMES[track])
+    axes.set(xlabel=f"x / {group.unit}", ylabel=f"y / {group.unit}")
+    axes.margins(0.08)
+
+
+def draw_frames(axes: Axes, groups: Sequence[GroupFindings]) -> None:
+    """The error over the frames: the median over runs and nodes, in a band from 10 to 90 per cent of them."""
+    (group,) = groups[:1]
+    for track in ("single", "cpf", "dcpf"):
+        if not group.has(track):
+            continue
+        errors = group.errors(track)
+        low, median, high = np.nanpercentile(errors, [10, 50, 90], axis=(0, 1))
+        frames = np.arange(1, errors.shape[2] + 1)
+        axes.plot(frames, median, color=_TINTS[track], linewidth=1.6, label=_NAMES[track])
+        axes.fill_between(frames, low, high, color=_TINTS[track], alpha=0.2, linewidth=0)
+    axes.set(xlabel="frame", ylabel=f"position error / {group.unit}", xlim=(0, group.truth().shape[1] - 1))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    log_axis(axes)
+
+
+def draw_bytes(axes: Axes, groups: Sequence[GroupFindings]) -> None:
+    """Mean RMSE over the bytes that all cameras send in a frame: DCPF's settings, CPF's codings."""
+    sent = [group.bytes_per_frame() for group in groups]
+    ours = [mean_interval(group.rmse("dcpf")) for group in groups]
+    x = np.array([each["dcpf"] for each in sent])
+    _draw_points(axes, x, ours, _TINTS["dcpf"], "-o", _NAMES["dcpf"])
+    _annotate(axes, groups, x, ours)
+    raw = mean_interval(groups[0].rmse("cpf"))
+    points = [("cpf", raw, "o", "CPF, raw pictures"), ("bins", raw, "s", "CPF, bin indices as PNG")]
+    if groups[0].has("coded"):
+        points.append(("jpeg", mean_interval(groups[0].rmse("coded")), "^", "CPF, JPEG"))
+    for name, interval, marker, label in points:
+        if name in sent[0]:
+            color = _TINTS["coded" if name == "jpeg" else "cpf"]
+            _draw_points(axes, np.array([sent[0][name]]), [interval], color, marker, label)
+    axes.set(xlabel="bytes a frame, all cameras", ylabel=_rmse_label(groups), xscale="log")
+    log_axis(axes)
+
+
+def draw_time(axes: Axes, groups: Sequence[GroupFindings]) -> None:
+    """Mean RMSE over the processor time of a frame: a camera's in DCPF, the central node's in CPF."""
+    if groups[0].has("cpf"):
+        spent = np.array([np.median(group.cpu_ms("central")) for group in groups])
+        _draw_cost(axes, groups, "cpf", spent, "central node")
+    if groups[0].has("dcpf"):
+        spent = np.array(
+            [np.median(group.cpu_ms("cameras")) / len(group.group.scenario_run.cameras) for group in groups]
+        )
+        _draw_cost(axes, groups, "dcpf", spent, "each camera")
+    axes.set(xlabel="processor time a frame / ms", ylabel=_rmse_label(groups))
+    log_axis(axes)
+    axes.set_xlim(left=0)
+
+
+def _draw_cost(
+    axes: Axes, groups: Sequence[GroupFindings], track: Track, spent: Float[np.ndarray, " S"], where: str
+) -> None:
+    intervals = [mean_interval(group.rmse(track)) for group in groups]
+    _draw_points(axes, spent, intervals, _TINTS[track], "-o", f"{_NAMES[track]}, {where}")
+    _annotate(axes, groups, spent, intervals)
+
+
+def _draw_cameras(axes: Axes, x: Float[np.ndarray, " S"], groups: Sequence[GroupFindings]) -> None:
+    """The mean RMSE of each single camera, thin; not where their number is what is swept."""
+    if not groups[0].has("single"):
+        return
+    each = [group.node_rmse("single").mean(axis=0) for group in groups]
+    if len({len(cameras) for cameras in each}) == 1:
+        lines = axes.plot(x, np.array(each), color=_TINTS["single"], linewidth=0.7, alpha=0.6)
+        if "each single camera" not in axes.get_legend_handles_labels()[1]:
+            lines[0].set_label("each single camera")
+
+
+def _draw_line(
+    axes: Axes, x: Float[np.ndarray, " S"], intervals: Sequence[Interval], color: str, label: str, dash: str
+) -> None:
+    value, low, high = np.array([[each.value, each.low, each.high] for each in intervals]).T
+    axes.plot(x, value, dash, marker="o", markersize=4, color=color, linewidth=1.6, label=label)
+    axes.fill_between(x, low, high, color=color, alpha=0.15, linewidth=0)
+
+
+def _draw_points(
+    axes: Axes, x: Float[np.ndarray, " S"], intervals: Sequence[Interval], color: str, style: str, label: str
+) -> None:
+    """Points with bars of 95% confidence."""
+    value, low, high = np.array([[each.value, each.low, each.high] for each in intervals]).T
+    axes.errorbar(
+        x, value, yerr=[value - low, high - value], fmt=style, color=color, markersize=5, linewidth=1.6,
+        elinewidth=0.8, capsize=2, label=label,
+    )  # fmt: skip
+
+
+def _annotate(
+    axes: Axes, groups: Sequence[GroupFindings], x: Float[np.ndarray, " S"], intervals: Sequence[Interval]
+) -> None:
+    """The value of the swept key below the first point's bar, and above the last one's."""
+    for index, end, offset, align in (
+        (0, intervals[0].low, -4, "top"),
+        (-1, intervals[-1].high, 4, "bottom"),
+    ):
+        name, value = groups[index].group.settings[0]
+        axes.annotate(
+            f"{_short(name)} = {value}", (x[index], end), xytext=(0, offset), textcoords="offset points",
+            ha="center", va=align, color=MUTED, size=8, zorder=5,
+            bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5, "alpha": 0.85},
+        )  # fmt: skip
+    axes.margins(x=0.12, y=0.12)
+
+
+def _rmse_label(groups: Sequence[GroupFindings]) -> str:
+    return f"RMSE of the position / {groups[0].unit}"
+
+
+def _numbers(values: Sequence[str]) -> tuple[Float[np.ndarray, " S"], bool]:
+    """The values as numbers, or their places where they are words."""
+    try:
+        return np.array([float(value) for value in values]), True
+    except ValueError:
+        return np.arange(len(values), dtype=float), False
+
+
+def _short(key: str) -> str:
+    return _SHORT.get(key, key.rpartition(".")[2].replace("_", " "))

@@ -1,0 +1,167 @@
+"""What the panels draw, against the findings that they draw it from."""
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from sim.experiments.found.findings import Findings, GroupFindings
+from sim.experiments.options import ExperimentOptions
+from sim.experiments.plan import make_plan
+from sim.pictures.experiment import PANELS, plot_page, plot_study
+from sim.pictures.theme import COLORS
+
+N_FRAMES = 5
+TRUTH = [[0.0, float(frame)] for frame in range(N_FRAMES)]
+
+
+def track(error):
+    """A track that is always so far from the truth, to the right."""
+    return {"positions": [[x + error, y] for x, y in TRUTH], "nees": [1.0] * N_FRAMES}
+
+
+@pytest.fixture
+def findings(small):
+    """Findings of a study for each kind of plot, with errors that follow from n, t and seed."""
+    grid = {"network.iterations": ["1", "12"], "filter.n_particles": ["300", "500"]}
+    studies = {
+        "error": {"sweep": grid},
+        "graph": {"sweep": {"network.graph": ["ring", "path"]}},
+        "bytes": {"plot": "bytes", "sweep": {"network.iterations": ["1", "12"]}, "jpeg_quality": 90},
+        "time": {"plot": "time", "sweep": {"filter.n_particles": ["300", "500"]}},
+        "paths": {"plot": "paths"},
+        "frames": {"plot": "frames"},
+    }
+    options = ExperimentOptions.model_validate(
+        {"name": "e", "runs": 3, "scenarios": [str(small)], "page": ["error", "paths"], "studies": studies}
+    )
+    plan = make_plan(options, small.parent, [], lambda *_: "here")
+    return Findings(options, tuple(GroupFindings(group, list(results(group))) for group in plan.groups))
+
+
+def results(group):
+    settings = dict(group.settings)
+    t, n = (float(settings.get(key, 10)) for key in ("network.iterations", "filter.n_particles"))
+    network = {
+        "network": {key: {"dcpf": 512 * t, "cpf": 1e6} for key in ("bytes_per_frame", "bytes_at_start")},
+        "timing": {},
+        "unit": "m",
+    }
+    for seed in group.seeds:
+        error = 0.1 / t + 10 / n + 0.01 * seed
+        cameras = {
+            "tracks": {
+                **{f"dcpf/{name}": track(error) for name in "ABCD"},
+                **{f"single/{name}": track(5 * error) for name in "AB"},
+            },
+            "cpu_ms_per_frame": 4 * n,
+            "summary": {
+                **network,
+                **{key: {"dcpf": 1, "cpf": 1} for key in ("rmse_m", "lost", "anees", "tracking")},
+            },
+        }
+        central = {
+            "tracks": {"cpf/c": track(error / 2)},
+            "cpu_ms_per_frame": n,
+            "summary": cameras["summary"],
+        }
+        coded = {**central, "bytes_per_frame": {"jpeg": 1e5, "bins": 2e5}}
+        parts = {"cameras": cameras, "central": central, "coded": coded}
+        yield {kind: {**part, "truth": TRUTH} for kind, part in parts.items()}
+
+
+def panel(findings, name):
+    axes = Figure().add_subplot()
+    PANELS[findings.options.studies[name].plot](axes, findings.study(name))
+    return axes
+
+
+def lines(axes):
+    return {line.get_label(): line for line in axes.get_lines() if not line.get_label().startswith("_")}
+
+
+def points(axes):
+    """Where the points with error bars stand on the axis."""
+    return {each.get_label(): each.lines[0].get_xdata() for each in axes.containers}
+
+
+def test_a_line_for_each_estimator_and_each_value_of_the_second_key(findings):
+    drawn = lines(panel(findings, "error"))
+
+    assert set(drawn) == {
+        "each single camera",
+        *(f"{name}, n = {n}" for name in ("DCPF", "CPF", "best single camera") for n in (300, 500)),
+    }
+    few = drawn["DCPF, n = 300"]
+    np.testing.assert_allclose(few.get_xdata(), [1, 12])
+    # The mean over the seeds 0, 1, 2.
+    np.testing.assert_allclose(few.get_ydata(), [0.1 + 10 / 300 + 0.01, 0.1 / 12 + 10 / 300 + 0.01])
+    assert few.get_color() == COLORS["dcpf"]
+    assert few.get_linestyle() != drawn["DCPF, n = 500"].get_linestyle()
+
+
+def test_words_stand_at_their_place_on_the_axis(findings):
+    axes = panel(findings, "graph")
+
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["ring", "path"]
+    assert axes.get_xlabel() == "communication graph"
+
+
+def test_bytes_are_those_that_were_sent(findings):
+    axes = panel(findings, "bytes")
+
+    np.testing.assert_allclose(points(axes)["DCPF"], [512, 6144])
+    assert {name: x.tolist() for name, x in points(axes).items() if name != "DCPF"} == {
+        "CPF, raw pictures": [1e6],
+        "CPF, JPEG": [1e5],
+        "CPF, bin indices as PNG": [2e5],
+    }
+
+
+def test_time_is_a_cameras_and_the_central_nodes(findings):
+    drawn = points(panel(findings, "time"))
+
+    np.testing.assert_allclose(drawn["DCPF, each camera"], [300, 500])
+    np.testing.assert_allclose(drawn["CPF, central node"], [300, 500])
+
+
+def test_paths_are_truth_and_mean_deviation(findings):
+    drawn = lines(panel(findings, "paths"))
+
+    np.testing.assert_allclose(drawn["truth"].get_xydata(), TRUTH)
+    error = 0.1 / 10 + 10 / 10 + 0.01
+    np.testing.assert_allclose(drawn["DCPF"].get_xdata(), [error] * N_FRAMES)
+    np.testing.assert_allclose(drawn["best single camera"].get_xdata(), [5 * error] * N_FRAMES)
+
+
+def test_frames_show_the_median_from_frame_one_on(findings):
+    line = lines(panel(findings, "frames"))["CPF"]
+
+    np.testing.assert_allclose(line.get_xdata(), np.arange(1, N_FRAMES))
+    np.testing.assert_allclose(line.get_ydata(), [(0.1 / 10 + 10 / 10 + 0.01) / 2] * (N_FRAMES - 1))
+
+
+def test_a_page_has_a_row_a_study_and_its_figures_a_title(findings):
+    page = plot_page(findings, "robust")
+
+    assert [axes.get_title() for axes in page.axes] == ["small (robust)"] * 2
+    assert [axes.get_xlabel() for axes in page.axes] == ["rounds of consensus t", "x / m"]
+    assert len(plot_study(findings, "error").axes) == 1
+
+
+@pytest.mark.parametrize("name", ["error", "graph", "bytes", "time", "frames", "paths"])
+def test_no_label_is_drawn_over_another_or_cut_off(findings, name):
+    figure = plot_study(findings, name)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+
+    renderer, (width, height) = canvas.get_renderer(), canvas.get_width_height()
+    (axes,) = figure.axes
+    texts = [axes.xaxis.label, axes.yaxis.label, axes.title, *axes.get_legend().get_texts(), *axes.texts]
+    boxes = [text.get_window_extent(renderer) for text in texts if text.get_text()]
+    for index, box in enumerate(boxes):
+        assert box.x0 >= 0
+        assert box.y0 >= 0
+        assert box.x1 <= width
+        assert box.y1 <= height
+        assert not any(box.overlaps(other) for other in boxes[:index])
