@@ -1,4 +1,4 @@
-"""The sensor against the cameras themselves, derivatives against differences, noise against what it claims."""
+"""The sensor against cameras, its derivatives against differences, its noise against what it claims."""
 
 import numpy as np
 import pytest
