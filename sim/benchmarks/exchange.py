@@ -1,4 +1,4 @@
-"""Three ways for a node to exchange one message with each of its neighbours: what a round costs, and its floors.
+"""Three ways for a node to exchange a message with each of its neighbours: a round, and its two floors.
 
 All three carry the same bytes over the same graph: the node's own rounds, as a run has them; Zenoh bare, with
 the same kind of session, publisher and channels; and plain Unix sockets.
@@ -55,8 +55,8 @@ class ConsensusRounds:
         """A frame of so many rounds."""
         algorithm = MetropolisWeights().tuned(self._graph, count)
         consensus = Consensus(self._name, self._graph.neighbors(self._name), algorithm, count)
-        for message in consensus.begin(self._frame, np.arange(N_NUMBERS, dtype=float)):
-            self._transport.send(message)
+        for said in consensus.begin(self._frame, np.arange(N_NUMBERS, dtype=float)):
+            self._transport.send(said)
         while waiting := consensus.waiting_for():
             message = self._transport.receive(waiting[0], PATIENCE_S)
             if not isinstance(message, ConsensusMessage):

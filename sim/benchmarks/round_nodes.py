@@ -7,7 +7,6 @@ import json
 import os
 import sys
 import time
-from collections.abc import Sequence
 from statistics import median
 from typing import Any
 
@@ -90,8 +89,7 @@ def _timed(ways: dict[str, Exchange], barrier: Exchange, n_nodes: int, turns: in
 
 
 def _read_all(descriptor: int) -> bytes:
-    parts: Sequence[bytes] = iter(lambda: os.read(descriptor, 65536), b"")
-    return b"".join(parts)
+    return b"".join(iter(lambda: os.read(descriptor, 65536), b""))
 
 
 if __name__ == "__main__":
