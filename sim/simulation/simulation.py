@@ -11,6 +11,7 @@ from itertools import islice
 
 import numpy as np
 from jaxtyping import Bool, Float
+from threadpoolctl import threadpool_limits
 
 from network.averaging import matrices
 from network.streams import stream
@@ -49,6 +50,8 @@ def simulate(assembly: Assembly) -> Iterator[SimulatedFrame]:
     Raises:
         ScenarioError: The scenario asks for what has no closed form, or nobody knows the truth.
     """
+    # As in runs; and threads that wait for each other over small matrices take longer than one.
+    threadpool_limits(1)
     scenario = assembly.scenario
     _require_closed_form(scenario)
     truth = assembly.truth

@@ -1,4 +1,4 @@
-"""The benchmark of consensus rounds: its three ways exchange what they should, and it reports what it says."""
+"""The benchmark of consensus rounds: its ways exchange what they should, and it reports what it says."""
 
 import threading
 
