@@ -56,6 +56,7 @@ def _draw_network(figure: Figure, axes: Axes, found: Simulated, assembly: Assemb
         norm=LogNorm(low, high), linewidths=0, rasterized=True, zorder=2,
     )  # fmt: skip
     bar = figure.colorbar(dots, ax=axes, shrink=0.8, format="{x:g}")
+    bar.ax.yaxis.set_minor_formatter("{x:g}")
     bar.set_label("RMSE of the camera's estimates / m")
     truth, exact = np.array(found.truth)[:, :2], np.array(found.exact)[:, :2]
     axes.plot(*truth.T, color=COLORS["truth"], linewidth=3.2, alpha=0.35, label=LABELS["truth"])
