@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 from rich.logging import RichHandler
 
+from sim.commands.bench import bench
 from sim.commands.clip import clip
 from sim.commands.compare import compare
 from sim.commands.consensus import consensus
@@ -33,6 +34,7 @@ for command in (
     *(node, central, check, schema, footage),
 ):
     app.command()(guarded(command))
+app.add_typer(bench)
 
 
 def main() -> NoReturn:

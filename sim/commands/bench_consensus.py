@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from sim.benchmarks.consensus import SHAPES, SIZES, TURNS, bench_consensus
+from sim.benchmarks.rounds.consensus import SHAPES, SIZES, TURNS, bench_consensus
 from sim.commands.shared import AsJson, progress_bar
 
 

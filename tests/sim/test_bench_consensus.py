@@ -5,8 +5,8 @@ import threading
 import pytest
 
 from network.graph import grid, ring
-from sim.benchmarks.consensus import bench_consensus
-from sim.benchmarks.exchange import PlainSockets, connected
+from sim.benchmarks.rounds.consensus import bench_consensus
+from sim.benchmarks.rounds.exchange import PlainSockets, connected
 from sim.running.children import RunFailed
 
 

@@ -53,7 +53,7 @@ def _measure(shape: str, n: int, turns: int) -> dict[str, float]:
     with tempfile.TemporaryDirectory(prefix="dcpf-") as folder:
         order = {"shape": shape, "n": n, "folder": folder, "turns": turns, "settle_s": 0.5 + SETTLE_S * n}
         process = subprocess.Popen(
-            [sys.executable, "-m", "sim.benchmarks.round_nodes", json.dumps(order)],
+            [sys.executable, "-m", "sim.benchmarks.rounds.nodes", json.dumps(order)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

@@ -1,6 +1,6 @@
 """The processes of `dcpf bench consensus`: this one forks a node for each name and collects what they timed.
 
-Usage: python -m sim.benchmarks.round_nodes JSON, with shape, n, folder and turns; JSON comes out.
+Usage: python -m sim.benchmarks.rounds.nodes JSON, with shape, n, folder and turns; JSON comes out.
 """
 
 import json
@@ -11,7 +11,7 @@ from statistics import median
 from typing import Any
 
 from network.graph import Graph
-from sim.benchmarks.exchange import BareZenoh, ConsensusRounds, Exchange, PlainSockets, connected
+from sim.benchmarks.rounds.exchange import BareZenoh, ConsensusRounds, Exchange, PlainSockets, connected
 from sim.scenario.model import GRAPHS
 
 ROUNDS = 12
