@@ -1,4 +1,4 @@
-"""`dcpf bench`: what the filter costs on this machine."""
+"""`dcpf bench`: what filter and network cost on this machine."""
 
 import json
 import os
@@ -21,7 +21,7 @@ from sim.running.recorder import RecordingError
 
 bench = typer.Typer(
     name="bench",
-    help="Measure filter and network on this machine.",
+    help="Measure this machine.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
