@@ -18,6 +18,7 @@ from sim.commands.node import central, node
 from sim.commands.replay import replay
 from sim.commands.run import run
 from sim.commands.simd import simd
+from sim.commands.simulate import simulate
 from sim.commands.watch import watch
 
 app = typer.Typer(
@@ -28,7 +29,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (run, watch, replay, compare, consensus, clip, simd, node, central, check, schema, footage):
+for command in (
+    *(run, watch, replay, compare, consensus, simulate, clip, simd),
+    *(node, central, check, schema, footage),
+):
     app.command()(guarded(command))
 app.add_typer(bench)
 
