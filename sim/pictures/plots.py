@@ -124,7 +124,7 @@ def _errors(results: Results, estimator: str) -> Float[np.ndarray, "C T"]:
 
 def _draw_nodes(axes: Axes, frames: Int[np.ndarray, " T"], errors: Float[np.ndarray, "C T"]) -> None:
     """The median of DCPF's nodes, and the band that holds them all."""
-    label, color = f"{LABELS['dcpf']}: median of the nodes, and range", COLORS["dcpf"]
+    label, color = f"{LABELS['dcpf']}: nodes' median and range", COLORS["dcpf"]
     axes.plot(frames, np.nanmedian(errors, axis=0), color=color, linewidth=1.8, label=label)
     low, high = np.nanmin(errors, axis=0), np.nanmax(errors, axis=0)
     axes.fill_between(frames, low, high, color=color, alpha=0.25, linewidth=0)

@@ -3,6 +3,8 @@
 Imports matplotlib: what only runs scenarios does not import this module.
 """
 
+from itertools import cycle
+
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
@@ -11,7 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from sim.assembly import Assembly
-from sim.pictures.ground import Area, area_of, field_of_view
+from sim.pictures.ground import Area, area_of, field_of_view, height_of_target
 from sim.pictures.plots import cleaned, draw_ground, draw_heights, draw_paths
 from sim.pictures.theme import COLORS, MUTED, SEEN
 from sim.running.results import Results
@@ -19,7 +21,7 @@ from sim.running.results import Results
 WIDTH_IN = 5.4
 """Of a figure: on a telephone its text can still be read."""
 _MARGIN = 0.12
-_OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_VIEWS = ("#009E73", "#E69F00", "#56B4E9", MUTED)  # of Okabe & Ito's colours those that are no estimator's
 _MOST_VIEWS = 12  # cameras whose fields of view are outlined: of more, the shade must say it
 
 
@@ -30,17 +32,15 @@ def plot_world(results: Results, assembly: Assembly) -> Figure:
         results: The run, or one of which nothing is known yet.
         assembly: Its scenario, put together.
     """
-    area = area_of(results, assembly)
+    area = _bounded(area_of(results, assembly))
     figure, axes = _of_shape(area)
     draw_ground(axes, results, assembly, area)
     if len(assembly.cameras) <= _MOST_VIEWS:
-        reach = float(np.linalg.norm(area.size))
-        for index, camera in enumerate(assembly.cameras.values()):
-            rim = field_of_view(camera, assembly.scenario.target.plane_height, reach)
-            axes.fill(
-                *rim.T, facecolor="none", edgecolor=_OKABE_ITO[index % len(_OKABE_ITO)], linewidth=0.9,
-                linestyle=(0, (6, 2)),
-            )  # fmt: skip
+        reach, height = float(np.linalg.norm(area.size)), height_of_target(results, assembly)
+        for color, camera in zip(cycle(_VIEWS), assembly.cameras.values(), strict=False):
+            axes.plot(*camera.center[:2], "o", markersize=15, markerfacecolor="none", markeredgecolor=color)
+            rim = field_of_view(camera, height, reach)
+            axes.fill(*rim.T, facecolor="none", edgecolor=color, linewidth=1.2, linestyle=(0, (6, 2)))
     if assembly.truth is not None:
         (path,) = axes.plot(*assembly.truth[:, :2].T, color=COLORS["truth"], linewidth=1.6)
         path.set_label("true path")
@@ -57,7 +57,7 @@ def plot_world(results: Results, assembly: Assembly) -> Figure:
 
 
 def plot_paths(results: Results) -> Figure:
-    """The estimates and the truth from near: on the ground, or in the picture of a camera that knows no other.
+    """The estimates and the truth from near, on the ground or in the one camera's picture.
 
     Args:
         results: The run.
@@ -67,7 +67,7 @@ def plot_paths(results: Results) -> Figure:
     known = np.concatenate([path[:, :2] for path in (fused if truth is None else [truth])])
     low, high = np.nanmin(known, axis=0), np.nanmax(known, axis=0)
     margin = max(_MARGIN * float((high - low).max()), 20.0 if unit == "px" else 0.3)
-    area = Area(low - margin, high + margin)
+    area = _bounded(Area(low - margin, high + margin))
     figure, axes = _of_shape(area)
     draw_paths(axes, results)
     _show(axes, area, unit)
@@ -87,7 +87,7 @@ def plot_heights(results: Results) -> Figure:
 
 
 def plot_disagreement(results: Results) -> Figure:
-    """How far the nodes' estimates are from each other, frame by frame: the mean and the most over all pairs."""
+    """How far the nodes' estimates are from each other in each frame: mean and most over all pairs."""
     n_axes, unit = results.scenario.target.n_axes, results.scenario.target.unit
     positions = np.array([results.means(track)[:, :n_axes] for track in results.of("dcpf").values()])
     figure = Figure(figsize=(WIDTH_IN, 2.9), layout="constrained")
@@ -102,10 +102,15 @@ def plot_disagreement(results: Results) -> Figure:
     return figure
 
 
+def _bounded(area: Area) -> Area:
+    """The area, widened to the proportions that a page bears."""
+    return area.widened(float(np.clip(area.size[0] / area.size[1], 1 / 1.1, 2.5)))
+
+
 def _of_shape(area: Area) -> tuple[Figure, Axes]:
-    """A figure for a part of the ground, in its proportions as far as a page bears it."""
-    shape = float(np.clip(area.size[1] / area.size[0], 0.4, 1.3))
-    figure = Figure(figsize=(WIDTH_IN, (WIDTH_IN - 0.8) * shape + 1.2), layout="constrained")
+    """A figure for a part of the ground, in its proportions."""
+    width, height = area.size
+    figure = Figure(figsize=(WIDTH_IN, (WIDTH_IN - 0.8) * height / width + 1.2), layout="constrained")
     return figure, cleaned(figure.add_subplot())
 
 

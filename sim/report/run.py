@@ -3,17 +3,16 @@
 Imports matplotlib: what only runs scenarios does not import this module.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from sim.assembly import Assembly
 from sim.pictures.convergence import plot_convergence
 from sim.pictures.plots import plot_errors
-from sim.report.elements import Moment, Plot, RunReport
+from sim.report.elements import Plot, RunReport
 from sim.report.figures import WIDTH_IN, plot_disagreement, plot_heights, plot_paths, plot_world
 from sim.report.retelling import filmed, told_again
 from sim.report.run_tables import figures_table, links_table, timing_table
@@ -122,7 +121,8 @@ def _places(results: Results, assembly: Assembly) -> list[Plot]:
         world = inline(plot_world(results, assembly), "world", "The ground from above with cameras and graph")
         caption = (
             "The ground from above: the darker, the more cameras have the target's middle in view there"
-            " (whatever stands between); dashed, each camera's field of view; dotted, who exchanges messages."
+            " (whatever stands between); dashed, each camera's field of view at that height; dotted, who"
+            " exchanges messages."
         )
         plots.append(Plot(world, caption))
     where = "in the picture, y downwards" if space == "image" else "on the ground, from near"
@@ -141,12 +141,14 @@ def _network(results: Results, assembly: Assembly) -> list[Plot]:
     name = results.scenario.network.consensus.algorithm
     found = dict(converge(results.scenario, (name,), None))
     graph = f"{len(assembly.graph.names)} nodes, {len(assembly.graph.edges)} links"
+    convergence = plot_convergence(graph, found)
+    convergence.set_size_inches(7.4, 3.4)
     apart = "How far the nodes' estimates are from each other"
     rounds = "How the rounds of a frame bring any values together"
     return [
         Plot(inline(plot_disagreement(results), "disagreement", apart), f"{apart}, over the frames."),
         Plot(
-            inline(plot_convergence(graph, found), "rounds", rounds),
+            inline(convergence, "rounds", rounds),
             f"{rounds} on this graph: the worst start, against theory.",
             wide=True,
         ),

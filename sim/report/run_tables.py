@@ -27,13 +27,13 @@ def figures_table(results: Results, summary: Mapping[str, Any]) -> Table:
                 number(tracking.get(f"ospa_{unit}"), unit),
                 number(tracking.get(f"gospa_{unit}"), unit),
                 ABSENT if summary["anees"][kind] is None else f"{summary['anees'][kind]:.2f}",
-                yes_or_no(lost[kind]),
+                _in_words(lost[kind]),
                 ABSENT if not tracking else f"{tracking['losses_per_node']:.3g}",
                 ABSENT if not tracking else seconds(tracking["reacquired_after_s"]),
             ]
         )
     rows += [
-        [f"{node} alone", number(value, unit), *[ABSENT] * 3, yes_or_no(lost["single"][node]), *[ABSENT] * 2]
+        [f"{node} alone", number(value, unit), *[ABSENT] * 3, _in_words(lost["single"][node]), *[ABSENT] * 2]
         for node, value in rmse["single"].items()
     ]
     low, high = anees_band(1, results.scenario.target.n_axes)
@@ -49,8 +49,8 @@ def figures_table(results: Results, summary: Mapping[str, Any]) -> Table:
     )
     note = (
         "ANEES: 1 if a filter's covariance says how wrong it is; with one run as one independent error, a"
-        f" consistent filter's lies between {low:.2f} and {high:.2f} in 95% of the runs. Intervals of the RMSE"
-        " need several runs: dcpf compare gives them."
+        f" consistent filter's lies between {low:.2f} and {high:.2f} in 95% of the runs. Intervals of the"
+        " RMSE need several runs: dcpf compare gives them."
     )
     return Table("Errors over frames 1 to the last", headings, rows, note)
 
@@ -112,7 +112,11 @@ def timing_table(summary: Mapping[str, Any]) -> Table | None:
     if late is not None and rows:
         rows.append(["frames cut for want of time", str(late), ABSENT])
     headings = ("step", "value or median", "99th percentile")
-    return Table("How long it took", headings, rows) if rows else None
+    return (
+        Table("Median and 99th percentile over the frames; of the slowest camera", headings, rows)
+        if rows
+        else None
+    )
 
 
 def number(value: float | None, unit: str) -> str:
@@ -125,11 +129,10 @@ def seconds(value: float | None) -> str:
     return ABSENT if value is None else f"{value:.2g} s"
 
 
-def yes_or_no(value: bool | None) -> str:
-    """A fact."""
-    return ABSENT if value is None else "yes" if value else "no"
-
-
 def _share(sent: Mapping[str, Mapping[str, float]], kind: str, links: int) -> list[str]:
     messages, octets = (sent.get(group, {}).get(kind, 0.0) / links for group in ("messages", "bytes"))
     return [f"{messages:.4g}", f"{octets:,.0f}"]
+
+
+def _in_words(fact: object) -> str:
+    return ABSENT if fact is None else "yes" if fact else "no"

@@ -1,8 +1,11 @@
-"""Pictures of the cameras at moments of a run: particles, 2σ ellipses, boxes and the truth, small enough for a page."""
+"""Pictures of the cameras at moments of a run, small enough for a page.
+
+Boxes and truth in the whole picture; particles, 2σ ellipses and means in a close-up, since they are small.
+"""
 
 import base64
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -20,6 +23,7 @@ from sim.recording.scene import in_world
 from sim.report.elements import Moment, Still
 from sim.report.retelling import Previews
 from sim.running.results import Results
+from sim.world.colors import bgr
 
 WIDTH_PX = 480
 """Of a picture, at most; less if there are so many that the page would become heavy."""
@@ -27,7 +31,10 @@ LIMIT_BYTES = 1_500_000
 """All pictures of a page together, at most, unless there are hundreds."""
 _MIN_WIDTH_PX = 120
 _QUALITY = 75
-_N_EVENLY = 3
+_INSET = 0.3  # side of a close-up against the picture's width
+_FRAME_PX = 2  # around a close-up
+_ROOM = 1.3  # what a close-up shows, against what it must
+_LEAST_PX = 16  # of the camera's picture in a close-up: fewer are no picture
 
 
 def choose_moments(results: Results) -> dict[int, str]:
@@ -69,21 +76,22 @@ def moments_of(
         width = max(_MIN_WIDTH_PX, int(0.9 * width * np.sqrt(LIMIT_BYTES / total)))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _View:
-    """One camera and how positions get into its picture of some width."""
+    """A part of a camera's picture, enlarged or made smaller, and how positions get into it."""
 
     camera: Camera
     target: TargetOptions
+    corner: Float[np.ndarray, " 2"]
     scale: float
 
     def pixels(self, positions: Float[np.ndarray, "N A"]) -> Float[np.ndarray, "N 2"]:
-        """Where positions are in the picture; NaN where the camera cannot picture them."""
+        """Where positions are in the part; NaN where the camera cannot picture them."""
         if self.target.space == "image":
             pixels = positions
         else:
             pixels, _ = self.camera.project(in_world(positions, self.target))
-        return (pixels + 0.5) * self.scale - 0.5
+        return (pixels + 0.5 - self.corner) * self.scale - 0.5
 
     def ellipse(self, estimate: EstimateMessage) -> Float[np.ndarray, "N 2"]:
         """The 2σ ellipse of an estimate's position across the ground, or in the picture itself."""
@@ -99,17 +107,21 @@ def _stills(
     truth = results.truth.get(frame)
     for name, preview in sorted(previews.items()):
         camera, found = assembly.cameras[name], _found(results, name, frame)
-        width = min(width_px, camera.width_px)
-        view = _View(camera, results.scenario.target, width / camera.width_px)
-        seen = _beneath(preview, found, view, width)
-        if seen is None:
+        image = cv2.imdecode(np.frombuffer(preview.jpeg, np.uint8), cv2.IMREAD_COLOR)
+        if image is None:
             continue
+        seen, width = np.asarray(image, dtype=np.uint8), min(width_px, camera.width_px)
+        view = _View(camera, results.scenario.target, np.zeros(2), 1.0)
         positions: dict[Shown, Float[np.ndarray, " A"]] = {
             kind: estimate.mean[: view.target.n_axes] for kind, estimate in found.items()
         }
         if truth is not None:
             positions["truth"] = truth.mean[: view.target.n_axes]
         picture = draw_frame(seen, camera, view.target, positions, frame=frame, width_px=width)
+        part = _close_up(seen, preview, found, positions, view, round(_INSET * width))
+        if part is not None:
+            target_px = view.pixels(positions["dcpf"][None])[0, 0]
+            _insert(picture, part, at_left=bool(target_px > camera.width_px / 2))
         _, webp = cv2.imencode(".webp", picture, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
         source = f"data:image/webp;base64,{base64.b64encode(webp.tobytes()).decode()}"
         yield Still(source, width, picture.shape[0], _words(name, frame, positions, view.target.unit))
@@ -126,22 +138,53 @@ def _found(results: Results, camera: str, frame: int) -> dict[Shown, EstimateMes
     }
 
 
-def _beneath(
-    preview: PreviewMessage, found: Mapping[Shown, EstimateMessage], view: _View, width_px: int
+def _close_up(
+    image: Image,
+    preview: PreviewMessage,
+    found: Mapping[Shown, EstimateMessage],
+    positions: Mapping[Shown, Float[np.ndarray, " A"]],
+    whole: _View,
+    size_px: int,
 ) -> Image | None:
-    """The picture with particles and ellipses, which lie below the boxes; None if it is none."""
-    image = cv2.imdecode(np.frombuffer(preview.jpeg, np.uint8), cv2.IMREAD_COLOR)
-    if image is None:
+    """A square around what this camera's DCPF believes: particles, 2σ ellipses, means, truth.
+
+    None where the camera does not see that place.
+    """
+    if "dcpf" not in found:
         return None
-    size = (width_px, round(view.camera.height_px * view.scale))
-    picture = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    if preview.particles.shape[1] == view.target.n_axes:
-        draw_dots(picture, view.pixels(preview.particles), PARTICLE, 1.5)
+    rim = whole.ellipse(found["dcpf"])
+    cloud = whole.pixels(preview.particles) if preview.particles.shape[1] == whole.target.n_axes else rim[:0]
+    shown = np.concatenate([rim, cloud])
+    middle = whole.pixels(positions["dcpf"][None])
+    if not (np.isfinite(shown).all() and whole.camera.contains(middle)[0]):
+        return None
+    half = max(_ROOM * float(np.abs(shown - middle).max()), _LEAST_PX / 2)
+    view = replace(whole, corner=middle[0] + 0.5 - half, scale=size_px / (2 * half))
+    # [u', v'] = scale [u - corner]: the part of the picture, its rim repeated where it ends
+    shift = -view.scale * view.corner + 0.5 * (view.scale - 1)
+    affine = np.column_stack([view.scale * np.eye(2), shift])
+    part = np.asarray(
+        cv2.warpAffine(
+            image, affine, (size_px, size_px), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        ),
+        dtype=np.uint8,
+    )
+    draw_dots(part, view.pixels(preview.particles[:, : whole.target.n_axes]), PARTICLE, 1.5)
     for kind, estimate in found.items():
-        rim = view.ellipse(estimate)
-        draw_lines(picture, rim, PAPER, 3)
-        draw_lines(picture, rim, COLORS[kind], 1)
-    return picture
+        draw_lines(part, view.ellipse(estimate), PAPER, 4)
+        draw_lines(part, view.ellipse(estimate), COLORS[kind], 2)
+    for kind, position in positions.items():
+        draw_dots(part, view.pixels(position[None]), PAPER, 4.5)
+        draw_dots(part, view.pixels(position[None]), COLORS[kind], 3.0)
+    return part
+
+
+def _insert(picture: Image, part: Image, *, at_left: bool) -> None:
+    """Puts a close-up into a lower corner, in a light frame."""
+    size = min(len(part), picture.shape[0] - _FRAME_PX)
+    across = slice(0, size + _FRAME_PX) if at_left else slice(-size - _FRAME_PX, None)
+    picture[-size - _FRAME_PX :, across] = bgr(PAPER)
+    picture[-size:, slice(0, size) if at_left else slice(-size, None)] = part[:size, :size]
 
 
 def _words(camera: str, frame: int, positions: Mapping[Shown, Float[np.ndarray, " A"]], unit: str) -> str:
