@@ -78,7 +78,8 @@ def compute_missing(
 
 def findings_of(plan: Plan, results: Mapping[str, Mapping[str, Any]]) -> Findings:
     """What the runs have found of which every part is there."""
-    groups, missing = [], {}
+    groups: list[GroupFindings] = []
+    missing: dict[str, int] = {}
     for group in plan.groups:
         runs = [
             (seed, parts)

@@ -18,7 +18,7 @@ from sim.pictures.ground import Area, area_of, coverage, heading, height_of_targ
 from sim.pictures.theme import COLORS, FAINT, INK, LABELS, MUTED, SEEN
 from sim.running.results import Results
 
-_GRID_CELLS = 600  # along the longer side of the ground, for who sees what
+_GRID_CELLS = 300  # along the longer side of the ground, for who sees what
 
 
 def plot_errors(results: Results) -> Figure:

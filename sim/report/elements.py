@@ -1,7 +1,7 @@
 """What a report is made of: tables, plots, and pictures, ready for the page."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from markupsafe import Markup
 
@@ -115,7 +115,7 @@ class StudyReport:
     """
 
     title: str
-    plot: Plot | None
+    plot: Plot
     claims: Sequence[tuple[bool, str]]
     figures: Sequence[Table]
 
@@ -138,4 +138,4 @@ class ExperimentReport:
     versions: Mapping[str, str]
     notes: Sequence[str]
     worlds: Sequence[Plot]
-    studies: Sequence[StudyReport] = field(default_factory=tuple)
+    studies: Sequence[StudyReport]
