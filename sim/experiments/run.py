@@ -20,28 +20,6 @@ def _without_progress(_total: int) -> Iterator[Callable[[int], None]]:
     yield lambda _done: None
 
 
-def run_experiment(
-    plan: Plan, store: Store, engine: Engine, progress: ProgressBar = _without_progress
-) -> Findings:
-    """Runs an experiment.
-
-    Args:
-        plan: The experiment.
-        store: Where finished parts are kept.
-        engine: Computes parts, in any order.
-        progress: Makes a bar for so many parts; it is told how many are done.
-
-    Returns:
-        What was found; it does not depend on the engine, nor on what was on disk already.
-
-    Raises:
-        RecordingError: The disk is full.
-    """
-    results: dict[str, Mapping[str, Any]] = {}
-    compute_missing(plan, store, engine, results, progress)
-    return findings_of(plan, results)
-
-
 def compute_missing(
     plan: Plan,
     store: Store,

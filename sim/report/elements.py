@@ -83,6 +83,7 @@ class RunReport:
         errors: Errors over the frames.
         places: World and paths.
         moments: Pictures of the cameras.
+        shown: What is drawn in them: `dcpf`, `cpf`, `truth`.
         network: Plots of how the cameras agree.
         links: Bytes and messages of each link.
         timing: How long it took.
@@ -97,6 +98,7 @@ class RunReport:
     errors: Sequence[Plot]
     places: Sequence[Plot]
     moments: Sequence[Moment]
+    shown: Sequence[str]
     network: Sequence[Plot]
     links: Table | None
     timing: Table | None

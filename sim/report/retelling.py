@@ -1,8 +1,8 @@
 """What the cameras saw and believed at some frames of a run: as recorded, or told again.
 
 A run in lockstep is the same every time, so its particles need not be kept: it is run again in this process.
-Where that gives other estimates than were recorded (in real time rounds are cut, nodes die), its particles are
-not the run's and are left out; the pictures are the same.
+Where that gives other estimates than were recorded (in real time rounds are cut, nodes die), its particles
+are not the run's and are left out; the pictures are the same.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping

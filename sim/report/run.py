@@ -59,6 +59,10 @@ def run_report(
         errors=_errors(results),
         places=_places(results, assembly),
         moments=moments_of(results, assembly, previews, why),
+        shown=[
+            *(kind for kind in ("dcpf", "cpf") if results.of(kind)),
+            *(["truth"] if results.truth else []),
+        ],
         network=_network(results, assembly),
         links=links_table(results, assembly, summary),
         timing=timing_table(summary),
@@ -72,6 +76,9 @@ def _facts(results: Results, summary: Mapping[str, Any]) -> dict[str, str]:
     subject = target.person or target.object or "what the footage shows"
     links = len(scenario.graph.edges)
     graph = network.graph if isinstance(network.graph, str) else f"{links} links"
+    averaging = (
+        f"{network.consensus.algorithm.replace('_', ' ')} averaging, {network.iterations} rounds a frame"
+    )
     source = "rendered" if scenario.footage is None else f"footage {scenario.footage.name or ''}".strip()
     return {
         "Scenario": scenario.name,
@@ -81,8 +88,7 @@ def _facts(results: Results, summary: Mapping[str, Any]) -> dict[str, str]:
         "Target": f"{subject}, {SPACES[target.space]}",
         "Cameras": f"{len(names)}: {', '.join(names)}",
         "Pictures": source,
-        "Network": f"{graph}, {network.consensus.algorithm.replace('_', ' ')} averaging,"
-        f" {network.iterations} rounds a frame",
+        "Network": f"{graph}, {averaging}" if links else "one camera, nobody to agree with",
         "Particles": f"{scenario.filter.n_particles} a filter",
         "Processes": str(summary["processes"]) if summary.get("processes") else "unknown",
     }

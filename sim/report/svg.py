@@ -24,7 +24,7 @@ VARIABLES = {
 """The theme's colours, and what the page calls them: it has them for light and for dark."""
 
 _PX_PER_POINT = 4 / 3
-_FONT = re.compile(r"(font: [^;\"]*?px )'DejaVu Sans'[^;\"]*")
+_FONT = re.compile(r"'DejaVu Sans'[^;\"]*")
 _PLACES = re.compile(r' (?:d|x|y|width|height|transform|points)="[^"]*"')
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _STYLE = re.compile(r'style="[^"]*"')
@@ -52,7 +52,7 @@ def inline(figure: Figure, name: str, label: str) -> Markup:
     drawing = re.sub(r"<defs>\s*</defs>", "", drawing).replace("xlink:href", "href")
     drawing = _within(_PLACES, drawing, _LONG_NUMBER, lambda number: f"{float(number):.2f}")
     drawing = _within(_STYLE, drawing, _COLOR, lambda color: VARIABLES.get(color, color))
-    drawing = _own_ids(_FONT.sub(r"\1var(--font)", drawing), name)
+    drawing = _own_ids(_FONT.sub("var(--font)", drawing), name)
     width, height = (size * 72 * _PX_PER_POINT for size in figure.get_size_inches())
     box = re.search(r'viewBox="[^"]*"', drawing)
     if box is None:
