@@ -34,7 +34,8 @@ _QUALITY = 75
 _INSET = 0.3  # side of a close-up against the picture's width
 _FRAME_PX = 2  # around a close-up
 _ROOM = 1.3  # what a close-up shows, against what it must
-_LEAST_PX = 16  # of the camera's picture in a close-up: fewer are no picture
+_AT_HAND = 3  # times as large, at most, to have the truth in it
+_LEAST_PX = 4  # of the camera's picture in a close-up
 
 
 def choose_moments(results: Results) -> dict[int, str]:
@@ -159,6 +160,9 @@ def _close_up(
     if not (np.isfinite(shown).all() and whole.camera.contains(middle)[0]):
         return None
     half = max(_ROOM * float(np.abs(shown - middle).max()), _LEAST_PX / 2)
+    if "truth" in positions:
+        aside = _ROOM * float(np.abs(whole.pixels(positions["truth"][None]) - middle).max())
+        half = max(half, aside) if aside < _AT_HAND * half else half
     view = replace(whole, corner=middle[0] + 0.5 - half, scale=size_px / (2 * half))
     # [u', v'] = scale [u - corner]: the part of the picture, its rim repeated where it ends
     shift = -view.scale * view.corner + 0.5 * (view.scale - 1)
