@@ -81,7 +81,9 @@ def _worlds(findings: Findings) -> Iterator[Plot]:
 
 def _study(findings: Findings, name: str, verdicts: Sequence[Verdict]) -> StudyReport:
     title = findings.options.studies[name].title or name
-    drawing = inline(plot_study(findings, name), f"study-{name}", f"Figure of the study {title}")
+    figure = plot_study(findings, name)
+    figure.suptitle("")  # the heading has said it
+    drawing = inline(figure, f"study-{name}", f"Figure of the study {title}")
     return StudyReport(
         title=title,
         plot=Plot(
