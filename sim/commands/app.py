@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 from rich.logging import RichHandler
 
+from sim.commands.bench import bench
 from sim.commands.clip import clip
 from sim.commands.compare import compare
 from sim.commands.consensus import consensus
@@ -44,6 +45,7 @@ for command in (
     footage,
 ):
     app.command()(guarded(command))
+app.add_typer(bench)
 
 
 def main() -> NoReturn:
