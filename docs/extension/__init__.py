@@ -1,7 +1,7 @@
 """What this site needs beside Sphinx: references written from the program, and equations as MathML.
 
-A page says `<!-- generated: NAME -->` where a reference shall stand, and `<!-- readme: PATH -->` where a README of
-the repository shall; both become Markdown before the page is read.
+A page says `<!-- generated: NAME -->` where a reference shall stand, and `<!-- readme: PATH -->` where a
+README of the repository shall; both become Markdown before the page is read.
 """
 
 import re

@@ -1,7 +1,7 @@
 """The references of scenario and experiment files, from the schemas that the program itself reads them by.
 
-A group of keys is a section; a key has an anchor of its own, its type, default, unit, and the docstring under its
-field. Where a group can be one of several, such as an averaging algorithm, each has a section.
+A group of keys is a section; a key has an anchor of its own, its type, default, unit, and the docstring under
+its field. Where a group can be one of several, such as an averaging algorithm, each has a section.
 """
 
 import re
@@ -53,9 +53,9 @@ def preset_reference() -> str:
         ("`paper`, in the image plane", dict(_flat(ONE_CAMERA_PAPER))),
         ("`robust`, of a person on a plane", dict(_flat(PERSON_PARTS))),
     ]
+    keys = sorted({key for column in columns for key in column})
     lines = ["| key | `paper` | `robust` |", "|---|---|---|"]
-    for key in sorted({key for column in columns for key in column}):
-        lines.append(f"| `{key}` | {' | '.join(_cell(column, key) for column in columns)} |")
+    lines += [f"| `{key}` | {' | '.join(_cell(column, key) for column in columns)} |" for key in keys]
     lines += ["", "| besides | key | value |", "|---|---|---|"]
     lines += [f"| {who} | `{key}` | {_cell(each, key)} |" for who, each in special for key in each]
     return "\n".join(lines)

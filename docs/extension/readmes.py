@@ -22,7 +22,7 @@ PAGES = {
 
 
 def readme(root: Path, path: str, depth: int) -> str:
-    """A README with its relative links as the page needs them: to pages, or to files that the site then holds.
+    """A README with its relative links as the page needs them: to pages, or to files that the site holds.
 
     Args:
         root: Of the repository.

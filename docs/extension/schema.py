@@ -48,7 +48,7 @@ def variants(field: Schema, schema: Schema) -> Iterator[tuple[str, str, Schema]]
                 )
 
 
-def type_text(field: Schema, schema: Schema) -> str:
+def type_text(field: Schema, schema: Schema) -> str:  # noqa: PLR0911 - a case for each kind of value
     """What a value may be."""
     match resolve(field, schema):
         case {"properties": _} | {"discriminator": _}:
