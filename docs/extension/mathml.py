@@ -28,5 +28,6 @@ def _display(translator: Any, node: nodes.math_block) -> None:
         number += f"{link}</span>"
     else:
         translator.body.append(translator.starttag(node, "div", CLASS="math"))
-    translator.body.append(f"{convert(node.astext(), display='block')}{number}</div>\n")
+    equation = convert(node.astext(), display="block")
+    translator.body.append(f'<div class="equation">{equation}</div>{number}</div>\n')
     raise nodes.SkipNode

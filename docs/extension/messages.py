@@ -3,6 +3,7 @@
 import inspect
 import json
 import re
+import textwrap
 from dataclasses import fields
 from typing import Any, get_args
 
@@ -93,7 +94,7 @@ def _message(kind: Any, example: PublicMessage | None) -> str:
             lines.append(f"| `{each.name}` | {kind_text} | {told.get(each.name, '')} |")
     if example is not None:
         line = json.dumps(json.loads(encode("scene1", example)), ensure_ascii=False)
-        lines += ["", "```json", line, "```"]
+        lines += ["", "```json", textwrap.fill(line, 90, subsequent_indent=" "), "```"]
     return "\n".join([*lines, "", ""])
 
 

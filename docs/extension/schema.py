@@ -18,6 +18,13 @@ _KINDS = {
     "boolean": "`true` or `false`",
     "null": "`null`",
 }
+_PLURALS = {
+    "number": "numbers",
+    "whole number": "whole numbers",
+    "text": "texts",
+    "list": "lists",
+    "group": "groups",
+}
 _LIMITS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
 
 Schema = Mapping[str, Any]
@@ -63,6 +70,8 @@ def type_text(field: Schema, schema: Schema) -> str:  # noqa: PLR0911 - a case f
             return _list_text(array, schema)
         case {"type": "object", "additionalProperties": dict() as inner}:
             return f"names, each with {type_text(inner, schema)}"
+        case {"type": "object", "patternProperties": patterns}:
+            return f"names, each with {', or '.join(type_text(inner, schema) for inner in patterns.values())}"
         case {"pattern": _, "examples": [example, *_]}:
             return f'text such as `"{example}"`'
         case plain:
@@ -76,7 +85,13 @@ def _list_text(field: Schema, schema: Schema) -> str:
         kinds = list(dict.fromkeys(type_text(each, schema) for each in places))
         return f"list of {len(places)}: {', '.join(kinds)}"
     inner = field.get("items")
-    return f"list, each {type_text(inner, schema)}" if inner else "list"
+    return f"list of {_several(type_text(inner, schema))}" if inner else "list"
+
+
+def _several(kind: str) -> str:
+    """A type in the plural, where it has one."""
+    word = next((word for word in _PLURALS if re.match(rf"{word}\b", kind)), "")
+    return kind.replace(word, _PLURALS[word], 1) if word else f"items, each {kind}"
 
 
 def default_text(value: Any) -> str:
