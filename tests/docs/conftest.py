@@ -91,18 +91,18 @@ class Terminals:
     def beside(self, text):
         """Types some lines in another terminal, and waits until they listen."""
         self.ready.unlink(missing_ok=True)
-        self.others.append(self.start(text))
+        self.others.append((text, self.start(text)))
         assert self.wait_until(self.ready.exists)
 
     def close(self):
-        """Ctrl-C in the other terminals: the exit code of each, and what was printed."""
-        for process in self.others:
+        """Interrupts the other terminals: of each what was typed, its exit code, and what was printed."""
+        for text, process in self.others:
             try:
                 stdout, stderr = process.communicate(timeout=1)
             except subprocess.TimeoutExpired:
-                end(process, signal.SIGINT)
+                end(process, signal.SIGTERM)
                 stdout, stderr = process.communicate(timeout=LIMIT_S)
-            yield process.returncode, stdout, stderr
+            yield text, process.returncode, stdout, stderr
 
 
 def end(process, number):
@@ -116,6 +116,6 @@ def terminals(tmp_path, wait_until):
     """A reader's folder."""
     there = Terminals(tmp_path, wait_until)
     yield there
-    for process in there.others:
+    for _, process in there.others:
         end(process, signal.SIGKILL)
         process.communicate()
