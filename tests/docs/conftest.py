@@ -29,7 +29,7 @@ for name, endpoint in zip({cameras!r} + ("central",), nodes):
 sys.argv += {{
     "run": ["--frames", "5", *addresses],
     "node": ["--frames", "5", *addresses],
-    "compare": ["--frames", "4", "--runs", "2", "--jobs", "1"],
+    "compare": ["--frames", "4", "--runs", "1", "--jobs", "1"],
     "watch": ["--connect", router],
 }}.get(command, [])
 if command in ("watch", "node"):
