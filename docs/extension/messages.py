@@ -24,6 +24,7 @@ from network.messages import (
     TruthMessage,
     Visibility,
 )
+from network.quantization import Encoding
 
 EXAMPLES: tuple[PublicMessage, ...] = (
     EstimateMessage(
@@ -83,7 +84,7 @@ def _message(kind: Any, example: PublicMessage | None) -> str:
     lines = [
         f"### {kind.kind}",
         "",
-        inspect.getdoc(kind).splitlines()[0],
+        (inspect.getdoc(kind) or "").partition("\n")[0],
         "",
         "| field | type | what |",
         "|---|---|---|",
@@ -110,7 +111,7 @@ def binary_reference() -> str:
     table = (inspect.getdoc(codec) or "").partition("\n\n")[2].rpartition("Reading never trusts")[0]
     sizes = ["| message | bytes |", "|---|---|"]
     for numbers in (5, 9, 28):
-        for encoding in get_args(codec.Encoding):
+        for encoding in get_args(Encoding):
             message = ConsensusMessage("C1", 1, 1, 2, np.zeros(numbers), encoding)
             sizes.append(f"| consensus, {numbers} numbers, {encoding} | {len(encode('scene1', message))} |")
     sizes.append(f"| confirm | {len(encode('scene1', ConfirmMessage('C1', 1)))} |")

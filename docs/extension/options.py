@@ -96,7 +96,7 @@ def _section(
         yield f":::{{confval}} {path}{f' ({note})' if note else ''}"
         links = ", ".join(_link(root, path + suffix, choice) for suffix, choice, _ in variants(field, schema))
         yield f":type: {type_text(field, schema)}"
-        if "default" in field and not (links and field["default"]):
+        if "default" in field and not (links and isinstance(field["default"], dict | list)):
             yield f":default: {_defaults(path, field['default'], presets)}"
         elif key in required:
             yield ":default: none, it must be given"
@@ -111,10 +111,8 @@ def _section(
 
 def _defaults(path: str, default: Any, presets: Mapping[str, Mapping[str, Any]]) -> str:
     """The default, and what the presets have instead."""
-    told = {name: values[path] for name, values in presets.items() if path in values}
+    told = {name: values[path] for name, values in presets.items() if values.get(path, default) != default}
     others = [f"`{name}` preset: `{default_text(value)}`" for name, value in told.items()]
-    if len(others) == len(presets) and others:
-        return ", ".join(others)
     return ", ".join([f"`{default_text(default)}`", *others])
 
 
