@@ -13,7 +13,7 @@ from extension.commands import command_reference
 from extension.mathml import add_mathml
 from extension.messages import binary_reference, key_reference, message_reference
 from extension.options import experiment_reference, preset_reference, scenario_reference
-from extension.readmes import readme
+from extension.readmes import MARKER, readme
 
 GENERATED = {
     "scenario": scenario_reference,
@@ -26,8 +26,6 @@ GENERATED = {
 }
 """What a page can ask for."""
 
-_MARKER = re.compile(r"^<!-- (generated|readme): (\S+) -->$", re.MULTILINE)
-
 
 def fill(app: Sphinx, page: str, source: list[str]) -> None:
     """Puts Markdown in the place of the markers of a page."""
@@ -39,7 +37,7 @@ def fill(app: Sphinx, page: str, source: list[str]) -> None:
             return GENERATED[name]()
         return readme(Path(app.srcdir).parent, name, depth)
 
-    source[0] = _MARKER.sub(filling, source[0])
+    source[0] = MARKER.sub(filling, source[0])
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -2,23 +2,25 @@
 
 import posixpath
 import re
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 _LINK = re.compile(r"(?<=\]\()(?![a-z]+:|#)([^)#\s]+)")
 
-PAGES = {
-    "README.md": "index.md",
-    "CONTRIBUTING.md": "decisions/contributing.md",
-    "CHANGELOG.md": "changelog.md",
-    "benchmarks/README.md": "decisions/benchmarks.md",
-    "network/README.md": "decisions/network.md",
-    "nodes/README.md": "decisions/nodes.md",
-    "nodes/simd/README.md": "decisions/simd.md",
-    "sim/README.md": "decisions/sim.md",
-    "sim/pictures/README.md": "decisions/pictures.md",
-    "sim/world/README.md": "decisions/world.md",
-}
-"""The page of the site that holds a file of the repository."""
+MARKER = re.compile(r"^<!-- (generated|readme): (\S+) -->$", re.MULTILINE)
+"""What stands in a page where something is put in."""
+
+
+@cache
+def pages(docs: Path) -> Mapping[str, str]:
+    """The page of the site, relative to docs/, that holds each README."""
+    return {
+        name: page.relative_to(docs).as_posix()
+        for page in sorted(docs.rglob("*.md"))
+        for kind, name in MARKER.findall(page.read_text(encoding="utf-8"))
+        if kind == "readme"
+    } | {"README.md": "index.md"}
 
 
 def readme(root: Path, path: str, depth: int) -> str:
@@ -35,6 +37,6 @@ def readme(root: Path, path: str, depth: int) -> str:
         target = posixpath.normpath(posixpath.join(posixpath.dirname(path), link[1]))
         if (root / target).is_dir():
             target = posixpath.join(target, "README.md")
-        return "../" * depth + PAGES.get(target, f"../{target}")
+        return "../" * depth + pages(root / "docs").get(target, f"../{target}")
 
     return _LINK.sub(moved, text)
