@@ -169,8 +169,10 @@ class SmartCamera:
         log_likelihoods = self._model.log_likelihoods(picture, predicted.positions, self._appearance)
         result = local_filter(predicted, log_likelihoods)
         if own:
-            threshold = self._setup.filter.resampling.threshold
-            self._local_particles = resample_if_degenerate(result.particles, threshold, self._local_rng)
+            options = self._setup.filter
+            self._local_particles = resample_if_degenerate(
+                result.particles, options.resampling.threshold, self._local_rng, options.threads
+            )
         return result
 
     def _finish(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
@@ -189,8 +191,8 @@ class SmartCamera:
         prior = moments(frame.predicted.states, frame.predicted.weights)
         self._sighting = self._sighting.after(shrinkage_by(fused.gain, prior))
         # resample
-        threshold = setup.filter.resampling.threshold
-        self._particles = resample_if_degenerate(posterior, threshold, self._fusion_rng)
+        threshold, n_threads = setup.filter.resampling.threshold, setup.filter.threads
+        self._particles = resample_if_degenerate(posterior, threshold, self._fusion_rng, n_threads)
         # update the reference (Eq. 4)
         visible = self._update_appearance(frame.picture, estimate.position().mean)
         message = self._message(frame, estimate, ess, visible=visible)

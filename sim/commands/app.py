@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 from rich.logging import RichHandler
 
+from sim.commands.bench import bench
 from sim.commands.clip import clip
 from sim.commands.compare import compare
 from sim.commands.consensus import consensus
@@ -29,6 +30,7 @@ app = typer.Typer(
 )
 for command in (run, watch, replay, compare, consensus, clip, simd, node, central, check, schema, footage):
     app.command()(guarded(command))
+app.add_typer(bench)
 
 
 def main() -> NoReturn:

@@ -13,7 +13,14 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from sim.commands.shared import AsJson, Frames, Overrides, length_text, progress_bar, split_overrides
+from sim.commands.shared import (
+    AsJson,
+    Frames,
+    Overrides,
+    length_text,
+    progress_bar,
+    split_overrides,
+)
 from sim.experiments.found.claims import Verdict
 from sim.experiments.options import ExperimentOptions, StudyOptions, is_experiment
 from sim.experiments.plan import Plan, make_plan, plan_experiment
@@ -64,6 +71,7 @@ def compare(
     # What computes and draws takes its time to import; --help does not wait for it.
     import joblib
 
+    from sim.assembly import Assembly
     from sim.experiments.computing.engine import compute_here, compute_on_cluster
     from sim.experiments.computing.store import Store
     from sim.experiments.found.claims import judge
@@ -73,6 +81,8 @@ def compare(
 
     given = [*split_overrides(overrides), *([("frames", str(frames))] if frames else [])]
     plan = _plan(scenarios, sweeps or [], given, runs)
+    for group in plan.groups:
+        Assembly(group.scenario_run).require_backend()
     results = out or Path("runs") / f"{plan.options.name}-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
     store = Store(results / "parts")
     engine = (
