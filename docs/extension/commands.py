@@ -8,9 +8,13 @@ from sim.commands.app import app
 
 
 def commands() -> dict[str, Any]:
-    """The commands by name, as the parser of the command line has them."""
+    """The commands by name, those of groups with the group's, as the parser of the command line has them."""
     root: Any = typer.main.get_command(app)
-    return dict(root.commands)
+    found = {}
+    for name, command in root.commands.items():
+        members = getattr(command, "commands", {})
+        found |= {f"{name} {each}": member for each, member in members.items()} or {name: command}
+    return found
 
 
 def command_reference() -> str:
@@ -27,7 +31,7 @@ def _command(name: str, command: Any) -> list[str]:
         if each.param_type_name == "argument"
     ]
     lines = [
-        f"(dcpf-{name})=",
+        f"(dcpf-{name.replace(' ', '-')})=",
         f"## dcpf {name}",
         "",
         command.help,

@@ -99,8 +99,11 @@ CALLS = [
 
 @pytest.mark.parametrize("call", CALLS, ids=" ".join)
 def test_every_command_and_option_exists(call):
-    name, *arguments = call
-    assert typer.main.get_command(app).commands[name].make_context(name, arguments).params
+    command, arguments = typer.main.get_command(app), call
+    while hasattr(command, "commands"):
+        name, *arguments = arguments
+        command = command.commands[name]
+    assert command.make_context(command.name, arguments).params
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
