@@ -122,7 +122,7 @@ def _link(root: str, path: str, choice: str) -> str:
 
 
 def _slug(text: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+    return re.sub(r"[^a-z0-9]+", "-", text.lower().replace("[]", "-each")).strip("-")
 
 
 def _flat(group: Mapping[str, Any], at: str = "") -> Iterator[tuple[str, Any]]:
