@@ -16,6 +16,7 @@ from sim.commands.guard import guarded
 from sim.commands.inspect import check, footage, schema
 from sim.commands.node import central, node
 from sim.commands.replay import replay
+from sim.commands.report import report
 from sim.commands.run import run
 from sim.commands.simd import simd
 from sim.commands.simulate import simulate
@@ -30,7 +31,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 for command in (
-    *(run, watch, replay, compare, consensus, simulate, clip, simd),
+    *(run, watch, replay, compare, consensus, report, simulate, clip, simd),
     *(node, central, check, schema, footage),
 ):
     app.command()(guarded(command))
