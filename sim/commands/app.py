@@ -19,6 +19,7 @@ from sim.commands.replay import replay
 from sim.commands.report import report
 from sim.commands.run import run
 from sim.commands.simd import simd
+from sim.commands.simulate import simulate
 from sim.commands.watch import watch
 
 app = typer.Typer(
@@ -30,19 +31,8 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 for command in (
-    run,
-    watch,
-    replay,
-    compare,
-    consensus,
-    report,
-    clip,
-    simd,
-    node,
-    central,
-    check,
-    schema,
-    footage,
+    *(run, watch, replay, compare, consensus, report, simulate, clip, simd),
+    *(node, central, check, schema, footage),
 ):
     app.command()(guarded(command))
 app.add_typer(bench)
