@@ -15,12 +15,12 @@ from network.messages import ConsensusMessage, EstimateMessage, PreviewMessage
 from nodes.array_estimator import ArrayEstimator
 from nodes.estimator import SirEstimator
 from nodes.filtering.appearance import Appearance, pack_looks, settled, unpack_looks
-from nodes.filtering.fusion import fuse, is_density, pack, propagate, unpack
+from nodes.filtering.fusion import fuse, is_density, left_of, pack, propagate, unpack
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.local import LocalResult, local_filter
 from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.particles import Particles, effective_sample_size, resample_if_degenerate
-from nodes.filtering.sighting import Sighting, shrinkage_by
+from nodes.filtering.sighting import Sighting
 from nodes.preview import preview
 from nodes.setup import TrackingSetup
 from nodes.simd.report import FrameReport
@@ -98,7 +98,8 @@ class SmartCamera:
         self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
         self._frame = FrameInProgress(index, picture, predicted)
-        return self._with_result(self._consensus.begin(index, pack(local, self._setup.fusion)))
+        packed = pack(local, len(self._cameras), self._setup.fusion)
+        return self._with_result(self._consensus.begin(index, packed))
 
     def on_message(self, message: ConsensusMessage) -> Outgoing:
         """A neighbour's value of a round has come."""
@@ -189,7 +190,7 @@ class SmartCamera:
         estimate = moments(posterior.states, posterior.weights)
         ess = effective_sample_size(posterior)
         prior = moments(frame.predicted.states, frame.predicted.weights)
-        self._sighting = self._sighting.after(shrinkage_by(fused.gain, prior))
+        self._sighting = self._sighting.after(left_of(prior, fused))
         # resample
         threshold, n_threads = setup.filter.resampling.threshold, setup.filter.threads
         self._particles = resample_if_degenerate(posterior, threshold, self._fusion_rng, n_threads)

@@ -1,1 +1,1 @@
-"""What the filter costs on this machine, as ratios within one run: the code behind `dcpf bench`."""
+"""What filter and network cost on this machine, as ratios within one run: the code behind `dcpf bench`."""

@@ -1,4 +1,4 @@
-"""`dcpf bench`: what the filter costs on this machine."""
+"""`dcpf bench`: what filter and network cost on this machine."""
 
 import json
 import os
@@ -14,12 +14,16 @@ from rich.console import Console
 from rich.table import Table
 
 from sim.benchmarks.settings import SCENARIOS
+from sim.commands.bench_consensus import consensus
 from sim.commands.guard import guarded
 from sim.commands.shared import AsJson, progress_bar
 from sim.running.recorder import RecordingError
 
 bench = typer.Typer(
-    name="bench", help="Measure the filter on this machine.", no_args_is_help=True, rich_markup_mode=None
+    name="bench",
+    help="Measure this machine.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
 )
 ScenarioFolder = Annotated[
     Path, typer.Option("--scenarios", help="Folder of the shipped scenarios.", show_default="this checkout's")
@@ -114,3 +118,4 @@ def _print_parallel(report: dict[str, Any]) -> None:
 
 bench.command("filter")(guarded(filter_))
 bench.command("parallel")(guarded(parallel))
+bench.command("consensus")(guarded(consensus))

@@ -2,7 +2,8 @@
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
 from itertools import groupby
@@ -76,8 +77,10 @@ def compare(
     from sim.experiments.computing.store import Store
     from sim.experiments.found.claims import judge
     from sim.experiments.found.reporting import report, write_files
-    from sim.experiments.run import run_experiment
+    from sim.experiments.run import compute_missing, findings_of
     from sim.pictures.experiment import write_figures
+    from sim.report.experiment import experiment_report
+    from sim.report.page import FILE, write_page
 
     given = [*split_overrides(overrides), *([("frames", str(frames))] if frames else [])]
     plan = _plan(scenarios, sweeps or [], given, runs)
@@ -90,20 +93,34 @@ def compare(
         if cluster
         else partial(compute_here, n_jobs=jobs or joblib.cpu_count())
     )
-    findings = run_experiment(plan, store, engine, partial(progress_bar, "parts of runs"))
-    verdicts = judge(findings)
-    found = report(findings, verdicts)
+    done: dict[str, Mapping[str, Any]] = {}
     try:
+        compute_missing(plan, store, engine, done, partial(progress_bar, "parts of runs"))
+    finally:
+        # However it ends, the page shows what is there.
+        findings = findings_of(plan, done)
+        verdicts = judge(findings)
+        if findings.groups:
+            with _writing(results):
+                write_page(experiment_report(findings, verdicts), results / FILE)
+    found = report(findings, verdicts)
+    with _writing(results):
         write_files(findings, found, verdicts, results)
         write_figures(findings, results)
-    except OSError as error:
-        raise RecordingError(
-            f"{results}: cannot be written: {error.strerror}: free space, or name another --out"
-        ) from error
     if as_json:
         sys.stdout.write(json.dumps(found) + "\n")
     else:
         _print({label: each for label, each in found.items() if label != "claims"}, verdicts, results)
+
+
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise RecordingError(
+            f"{folder}: cannot be written: {error.strerror}: free space, or name another --out"
+        ) from error
 
 
 def _plan(paths: list[Path], sweeps: list[str], given: list[tuple[str, str]], runs: int | None) -> Plan:
@@ -139,7 +156,7 @@ def _print(found: dict[str, Any], verdicts: Sequence[Verdict], folder: Path) -> 
         console.print(
             f"{verdict.study}, {verdict.label}, {verdict.claim}: {holds}: {verdict.text}", soft_wrap=True
         )
-    console.print(f"figures and plots in {folder}", soft_wrap=True)
+    console.print(f"figures, plots and report.html in {folder}", soft_wrap=True)
 
 
 def _print_table(console: Console, keys: tuple[str, ...], rows: dict[str, Any]) -> None:

@@ -27,6 +27,7 @@ from sim.commands.shared import (
     yes_no,
 )
 from sim.running.in_process import run_in_process
+from sim.running.provenance import sent_per_frame, versions
 from sim.running.recorder import Film, Recorder, default_folder
 from sim.running.results import Results, length, summarize
 from sim.scenario.model import Scenario
@@ -93,7 +94,7 @@ def run(
             launch = Launch(assembly, recorder, bar, by_hand or [], BEGAN_S, audience=audience)
             results, dead = launch.run(), launch.dead
         summary = summarize(results, processes=1 if in_process else chosen.n_processes)
-        summary["died"] = dead
+        summary |= {"died": dead, "sent_per_frame": sent_per_frame(results), "versions": versions()}
         recorder.finish(summary)
     if as_json:
         sys.stdout.write(json.dumps(summary) + "\n")

@@ -40,6 +40,7 @@ def read_scenario(
     frames: int | None = None,
     pace: str | None = None,
     name: str | None = None,
+    rendered: bool = True,
 ) -> Scenario:
     """A scenario with what the command line says instead.
 
@@ -49,9 +50,10 @@ def read_scenario(
     """
     given = {"seed": seed, "frames": frames, "pace": pace, "name": name}
     chosen = [(key, str(value)) for key, value in given.items() if value is not None]
-    scenario = load_scenario(path, [*split_overrides(overrides), *chosen])
-    _require_backend(scenario)
-    _say_of_threads(scenario.filter)
+    scenario = load_scenario(path, [*split_overrides(overrides), *chosen], rendered=rendered)
+    if rendered:
+        _require_backend(scenario)
+        _say_of_threads(scenario.filter)
     return scenario
 
 

@@ -254,10 +254,16 @@ def _network(results: Results) -> dict[str, Any]:
 def _total(statuses: Mapping[str, StatusMessage], group: str) -> Counter[str]:
     total: Counter[str] = Counter()
     for status in statuses.values():
-        counted = status.counters.get(group)
-        for kind, number in (counted if isinstance(counted, Mapping) else {}).items():
-            total[kind] += int(number)
+        total.update(counted(status, group))
     return total
+
+
+def counted(status: StatusMessage, group: str) -> Counter[str]:
+    """What a node has counted of a group, such as `bytes`, by kind."""
+    found = status.counters.get(group)
+    return Counter(
+        {kind: int(number) for kind, number in (found if isinstance(found, Mapping) else {}).items()}
+    )
 
 
 def _fusion(results: Results) -> dict[str, Any]:

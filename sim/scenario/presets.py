@@ -65,7 +65,7 @@ PERSON_PARTS: Mapping[str, Any] = {
     }
 }
 """Head, torso and legs: what the robust preset tells apart in a target that stands on a plane, and the
-rows of samples to do so. Spread evenly: a box follows a body closely, and its border tells most about where it
+rows of samples to do so. They lie evenly: a box follows a body closely, and its border tells most of where it
 is."""
 
 
