@@ -41,6 +41,8 @@ PURE = (
         ROOT / "sim" / name
         for name in (
             *("live/nodes.py", "live/setting.py", "live/story.py", "replay/playback.py"),
+            *("report/elements.py", "report/figures.py", "report/run_tables.py", "report/stills.py"),
+            "report/svg.py",
             *("recording/foxglove.py", "recording/scene.py", "recording/schemas.py"),
         )
     ),
