@@ -57,6 +57,11 @@ def simulate(assembly: Assembly) -> Iterator[SimulatedFrame]:
     truth = assembly.truth
     if truth is None:
         raise ScenarioError(f"{scenario.name} has no ground truth, which sensors need: give it one")
+    if not np.isfinite(truth).all():
+        unknown = int(np.flatnonzero(~np.isfinite(truth).all(axis=1))[0])
+        raise ScenarioError(
+            f"{scenario.name} has no ground truth in frame {unknown}, which sensors need: run fewer --frames"
+        )
     sensors = Sensors.of(list(assembly.cameras.values()))
     n_cameras, (n_frames, n_states) = len(sensors.K), truth.shape
     rule, motion, ridge = RULES[scenario.fusion.rule], assembly.setup.motion, scenario.fusion.ridge

@@ -167,7 +167,7 @@ def test_compare_writes_figures_and_plots(dcpf, small, tmp_path):
     assert [each["seed"] for each in report["summaries"]] == [0, 1]
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         *("comparison.json", "comparison.svg", "comparison.png", "cells.jsonl", "summary.csv", "timing.json"),
-        "parts",
+        *("parts", "report.html"),
     }
 
 
