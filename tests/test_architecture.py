@@ -17,6 +17,7 @@ OUTSIDE_WORLD = {
 
 PURE = (
     *sorted((ROOT / "nodes/filtering").rglob("*.py")),
+    *sorted((ROOT / "nodes/vision").glob("*.py")),
     *sorted(path for path in (ROOT / "nodes/counting").glob("*.py") if path.name != "build.py"),
     *sorted((ROOT / "sim/metrics").glob("*.py")),
     ROOT / "sim/running/metrics.py",

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from network.messages import EstimateMessage, PreviewMessage
 from nodes.camera import Camera
-from nodes.filtering.target import TargetOptions
+from nodes.vision.target import TargetOptions
 from sim.assembly import Assembly
 from sim.pictures.canvas import Image, draw_dots, draw_lines
 from sim.pictures.ground import ellipse
