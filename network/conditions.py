@@ -81,17 +81,18 @@ class PartitionOptions(Options):
 
     def parts(self, one: str, other: str, frame: int) -> bool:
         """Whether it stands between two nodes in a frame."""
-        sides = [
-            next((i for i, group in enumerate(self.groups) if name in group), -1) for name in (one, other)
-        ]
-        return sides[0] != sides[1] and self.first_frame <= frame < self.first_frame + self.frames
+        lasts = self.first_frame <= frame < self.first_frame + self.frames
+        return lasts and self._side(one) != self._side(other)
+
+    def _side(self, name: str) -> int:
+        return next((i for i, group in enumerate(self.groups) if name in group), -1)
 
 
 class ConditionsOptions(LinkOptions):
-    """What the links between cameras do to the messages of the rounds; pixels for the central node arrive."""
+    """What the links between cameras do to the messages of the rounds; pixels always arrive."""
 
     links: tuple[OneLinkOptions, ...] = ()
-    """Links that differ from the others, each with all that holds for it; of two that fit, the last counts."""
+    """Links that differ from the others, each with all that holds for it; the last that fits counts."""
     partitions: tuple[PartitionOptions, ...] = ()
     """When the network falls into parts."""
 
@@ -128,8 +129,8 @@ class ConditionsOptions(LinkOptions):
         for each in self.links:
             if frozenset(each.link) not in there:
                 raise ValueError(
-                    f"network.conditions.links names {each.link[0]} and {each.link[1]}, between which the graph"
-                    " has no link: name the two ends of one"
+                    f"network.conditions.links names {each.link[0]} and {each.link[1]}, between which the"
+                    " graph has no link: name the two ends of one"
                 )
         for name in (name for each in self.partitions for group in each.groups for name in group):
             if name not in names:

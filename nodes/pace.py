@@ -56,5 +56,5 @@ def lag_for(iterations: int, message_s: float, rate_hz: float) -> int:
         message_s: How long a message is on its way, in s.
         rate_hz: Frames a second.
     """
-    # (1 + lag - wait) / rate / iterations >= message
+    # (1 + lag - wait) / (rate iterations) should be the message's time at least
     return max(0, math.ceil(iterations * message_s * rate_hz - (1 - _WAIT)))

@@ -98,7 +98,7 @@ class Assembly:
         """
         if not self.scenario.network.conditions.are_perfect:
             raise ScenarioError(
-                f"{self.scenario.name}: network.conditions act in virtual time: run with --in-process, or take"
+                f"{self.scenario.name}: network.conditions act in virtual time: add --in-process, or take"
                 " them out, for real links are what they are"
             )
 

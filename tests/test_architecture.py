@@ -30,6 +30,7 @@ PURE = (
             "central.py",
             "estimator.py",
             "frame.py",
+            "pace.py",
             "preview.py",
             "rounds.py",
             "setup.py",
@@ -47,7 +48,8 @@ PURE = (
     *(
         ROOT / "network" / name
         for name in (
-            *("codec.py", "consensus.py", "errors.py", "graph.py", "header.py", "jpeg.py", "keys.py"),
+            *("codec.py", "conditions.py", "consensus.py", "errors.py", "graph.py", "header.py"),
+            *("jpeg.py", "keys.py"),
             *(
                 "membership.py",
                 "memory.py",

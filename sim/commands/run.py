@@ -157,19 +157,21 @@ def _print(summary: dict[str, Any], scenario: Scenario, folder: Path) -> None:
         apart = length_text(length(summary, "disagreement"), unit)
         console.print(f"nodes disagree by {apart} in the mean")
     console.print(f"bytes a frame: DCPF {sent['dcpf']:,.0f}, CPF {sent['cpf']:,.0f}")
-    for line in _trouble_lines(summary["network"]):
-        console.print(line)
     indefinite = summary["fusion"]["indefinite_local_fraction"]
     if indefinite:
         console.print(f"Eq. 17's ratio was no density in {indefinite:.0%} of the local results")
     if "simd" in summary:
         console.print(_array_text(summary["simd"], scenario.filter.simd.words), soft_wrap=True)
-    timing = summary["timing"]
-    if "frames_per_s" in timing:
-        first, rate = timing["first_estimate_s"], timing["frames_per_s"]
-        console.print(f"first estimate after {first:.1f} s, then {rate:.0f} frames/s")
+    for line in (*_trouble_lines(summary["network"]), *_timing_lines(summary["timing"])):
+        console.print(line)
     _print_members(console, summary)
     console.print(f"recorded in {folder}", soft_wrap=True)
+
+
+def _timing_lines(timing: dict[str, Any]) -> Iterator[str]:
+    if "frames_per_s" in timing:
+        first, rate = timing["first_estimate_s"], timing["frames_per_s"]
+        yield f"first estimate after {first:.1f} s, then {rate:.0f} frames/s"
 
 
 def _trouble_lines(network: dict[str, Any]) -> Iterator[str]:
