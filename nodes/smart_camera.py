@@ -15,12 +15,12 @@ from network.messages import ConsensusMessage, EstimateMessage, PreviewMessage, 
 from nodes.array_estimator import ArrayEstimator
 from nodes.estimator import SirEstimator
 from nodes.filtering.appearance import Appearance, pack_looks, settled, unpack_looks
-from nodes.filtering.fusion import fuse, is_density, pack, propagate, unpack
+from nodes.filtering.fusion import fuse, is_density, left_of, pack, propagate, unpack
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.local import LocalResult, local_filter
 from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.particles import Particles, effective_sample_size, resample_if_degenerate
-from nodes.filtering.sighting import Sighting, shrinkage_by
+from nodes.filtering.sighting import Sighting
 from nodes.frame import FrameInProgress, is_new
 from nodes.preview import preview
 from nodes.rounds import Rounds
@@ -94,7 +94,9 @@ class SmartCamera:
         self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
         self._frames[index] = FrameInProgress(index, picture, self._done_frame, previous, predicted, fresh)
-        return self._with_result(self._rounds.begin(index, pack(local, self._setup.fusion)))
+        # as many as were there when it was last heard of
+        packed = pack(local, len(self._rounds.of(index).members), self._setup.fusion)
+        return self._with_result(self._rounds.begin(index, packed))
 
     def on_message(self, message: ConsensusMessage) -> Outgoing:
         """A neighbour's value of a round has come; one that was gone is counted on again."""
@@ -217,8 +219,10 @@ class SmartCamera:
         log_likelihoods = self._model.log_likelihoods(picture, predicted.positions, appearance)
         result = local_filter(predicted, log_likelihoods)
         if own:
-            threshold = self._setup.filter.resampling.threshold
-            self._local_particles = resample_if_degenerate(result.particles, threshold, self._local_rng)
+            options = self._setup.filter
+            self._local_particles = resample_if_degenerate(
+                result.particles, options.resampling.threshold, self._local_rng, options.threads
+            )
         return result
 
     def _finish(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
@@ -238,10 +242,10 @@ class SmartCamera:
         self._estimate = estimate
         ess = effective_sample_size(posterior)
         prior = moments(predicted.states, predicted.weights)
-        self._sighting = self._sighting.after(shrinkage_by(fused.gain, prior))
+        self._sighting = self._sighting.after(left_of(prior, fused))
         # resample
-        threshold = setup.filter.resampling.threshold
-        self._particles = resample_if_degenerate(posterior, threshold, self._fusion_rng)
+        threshold, n_threads = setup.filter.resampling.threshold, setup.filter.threads
+        self._particles = resample_if_degenerate(posterior, threshold, self._fusion_rng, n_threads)
         # update the reference (Eq. 4)
         visible = frame.fresh and self._update_appearance(frame.picture, estimate.position().mean)
         message = self._message(frame, estimate, ess, visible=visible)

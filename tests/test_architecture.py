@@ -16,10 +16,12 @@ OUTSIDE_WORLD = {
 """What would make the same arguments give another result, or has a life of its own."""
 
 PURE = (
-    *sorted((ROOT / "nodes/filtering").glob("*.py")),
+    *sorted((ROOT / "nodes/filtering").rglob("*.py")),
     *sorted(path for path in (ROOT / "nodes/counting").glob("*.py") if path.name != "build.py"),
     *sorted((ROOT / "sim/metrics").glob("*.py")),
     ROOT / "sim/running/metrics.py",
+    *(ROOT / "sim/simulation" / name for name in ("gaussians.py", "sensor.py", "simulation.py")),
+    ROOT / "sim/scenario/cameras.py",
     *sorted((ROOT / "network/averaging").glob("*.py")),
     *sorted((ROOT / "nodes/simd").rglob("*.py")),
     *(

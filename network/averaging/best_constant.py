@@ -9,7 +9,7 @@ from typing import Any, Literal
 from network.averaging.algorithm import Algorithm, AlgorithmOptions
 from network.averaging.constant import ConstantWeights
 from network.graph import Graph
-from network.spectrum import spectrum_of
+from network.spectrum import extremes_of
 
 
 class BestConstant(AlgorithmOptions):
@@ -20,4 +20,4 @@ class BestConstant(AlgorithmOptions):
 
     def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:  # noqa: ARG002 - good for any number of rounds
         """Constant weights of that size."""
-        return ConstantWeights(epsilon=spectrum_of(graph).step)
+        return ConstantWeights(epsilon=extremes_of(graph).step)

@@ -22,7 +22,7 @@ from jaxtyping import Float
 from network.averaging.algorithm import Algorithm, AlgorithmOptions, State, Vector
 from network.graph import Graph
 from network.messages import ConsensusMessage
-from network.spectrum import Spectrum, spectrum_of
+from network.spectrum import Spectrum, extremes_of
 
 
 class Chebyshev(AlgorithmOptions):
@@ -33,7 +33,7 @@ class Chebyshev(AlgorithmOptions):
 
     def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:  # noqa: ARG002 - good for any number of rounds
         """Chebyshev acceleration on this graph."""
-        return TunedChebyshev(spectrum_of(graph))
+        return TunedChebyshev(extremes_of(graph))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -123,21 +123,33 @@ def quantize(
     if options.space == "hue":
         return hue_bins(without_gain(image, gain), options.n_bins)[None]
     n = options.bins_per_channel
-    if 256 % n == 0 and np.all(gain == 1.0):
-        # floor(n · value / 256) without a table
-        values = np.right_shift(image, 8 - (n - 1).bit_length())
+    if 256 % n == 0 and (gain == 1.0).all():
+        # floor(n · value / 256) without a table: the first bits of each channel
+        bits = n.bit_length() - 1
         if options.space == "joint_rgb":
-            blue, green, red = cv2.split(values)
-            dtype = np.uint8 if options.n_bins <= 256 else np.uint16
-            return (red.astype(dtype) * dtype(n * n) + green.astype(dtype) * dtype(n) + blue)[None]
+            return _joint_bits(image, bits)[None]
+        rgba = cv2.cvtColor(image, cv2.COLOR_BGR2RGBA)
+        rgb = np.right_shift(rgba, 8 - bits, out=rgba)
     else:
         tables = _tables(options, gain).astype(np.uint8 if options.n_bins <= 256 else np.uint16)
         values = cv2.LUT(image, np.ascontiguousarray(tables.T)[None])
         if options.space == "joint_rgb":
             blue, green, red = cv2.split(values)
             return (red + green + blue)[None]
+        rgb = cv2.cvtColor(values, cv2.COLOR_BGR2RGBA)
     # side by side in memory, four bytes a pixel, as counting wants them
-    return np.moveaxis(cv2.cvtColor(values, cv2.COLOR_BGR2RGBA), -1, 0)[:3]
+    return np.moveaxis(rgb, -1, 0)[:3]
+
+
+def _joint_bits(image: UInt8[np.ndarray, "H W 3"], bits: int) -> Integer[np.ndarray, "H W"]:
+    """The first bits of red, green and blue one after the other, at most 4 of each."""
+    # OpenCV cuts red to 5 bits, green to 6 and blue to 5, in a word of 16
+    words = cv2.cvtColor(image, cv2.COLOR_BGR2BGR565).view(np.uint16)[..., 0]
+    joint = (words >> (16 - bits)) << (2 * bits)
+    low = (1 << bits) - 1
+    joint |= ((words >> (11 - bits)) & low) << bits
+    joint |= (words >> (5 - bits)) & low
+    return joint if bits > 2 else joint.astype(np.uint8)
 
 
 def _tables(options: ColorOptions, gain: Float[np.ndarray, " 3"]) -> Int[np.ndarray, "3 256"]:
@@ -172,7 +184,7 @@ def without_gain(
     image: UInt8[np.ndarray, "H W 3"], gain: Float[np.ndarray, " 3"]
 ) -> UInt8[np.ndarray, "H W 3"]:
     """The picture with each channel's gain divided out, rounded to grey levels."""
-    if np.all(gain == 1.0):
+    if (gain == 1.0).all():
         return image
     levels = np.minimum(np.rint(_VALUES / gain[:, None]), 255).astype(np.uint8)
     return np.asarray(cv2.LUT(image, np.ascontiguousarray(levels.T)[None]), dtype=np.uint8)

@@ -40,8 +40,10 @@ def hue_bins(image: UInt8[np.ndarray, "H W 3"], n_bins: int) -> UInt8[np.ndarray
     """
     hsv = cv2.cvtColor(image.astype(np.float32), cv2.COLOR_BGR2HSV)
     hue, saturation, value = hsv[..., 0], hsv[..., 1], hsv[..., 2]
-    sector = ((hue + np.float32(NUDGE)) * np.float32((n_bins - 1) / 360)).astype(np.uint8)
+    sector = np.empty(hue.shape, np.uint8)
+    np.multiply(hue + np.float32(NUDGE), np.float32((n_bins - 1) / 360), out=sector, casting="unsafe")
     # C = S M is whole, and S is further from the limit than the error of floats
-    grey = (saturation * value < GREY_CHROMA - 0.5) | (saturation < GREY_SATURATION / FULL_SATURATION)
+    grey = saturation * value < GREY_CHROMA - 0.5
+    grey |= saturation < GREY_SATURATION / FULL_SATURATION
     np.copyto(sector, n_bins - 1, where=grey, casting="unsafe")
     return sector

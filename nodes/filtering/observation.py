@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
+from pydantic import Field
 
 from network.options import Options
 from nodes.camera import Camera
@@ -36,9 +37,12 @@ from nodes.filtering.pattern import Pattern, coefficients, full_codebook, patter
 from nodes.filtering.target import TargetOptions, project_boxes, visible_fraction
 from nodes.simd.likelihood import SimdLikelihood
 from nodes.simd.options import SimdOptions
+from nodes.threads import in_shares
 
 GOOD_SIGHT = 0.9
 """Part of the target's box inside the picture from which a camera trusts its own eyes for a reference."""
+LEAST_BOXES = 8000
+"""Boxes that a thread counts at least: each makes its own integral images, however few they are."""
 
 
 class ObservationOptions(Options):
@@ -50,6 +54,9 @@ class ObservationOptions(Options):
     The counts are equal to the last one."""
     simd: SimdOptions = SimdOptions()
     """The array, for the backend `simd`."""
+    threads: int = Field(default=1, ge=1, le=64)
+    """Threads of each filter, for likelihoods and resampling; the numbers are the same with any. Too few
+    particles for so many threads are done by fewer."""
     color: ColorOptions = ColorOptions()
     sampling: SamplingOptions = SamplingOptions()
     likelihood: LikelihoodOptions = LikelihoodOptions()
@@ -194,10 +201,23 @@ class ObservationModel:
     def box_distances(
         self, picture: Picture, boxes: Float[np.ndarray, "N 4"], appearance: Appearance
     ) -> Float[np.ndarray, " N"]:
-        """d² of each box to the reference, counted by the backend of the options."""
+        """d² of each box to the reference, counted by the backend of the options, in its threads."""
         pattern = pattern_of(appearance, self.options.color)
         if self.processor is not None:
             return self._on_array(picture, boxes, pattern, self.processor)
+        if self.options.threads == 1:
+            return self._share_distances(picture, boxes, pattern)
+        distances = np.empty(len(boxes))
+
+        def measure(share: slice) -> None:
+            distances[share] = self._share_distances(picture, boxes[share], pattern)
+
+        in_shares(measure, len(boxes), self.options.threads, LEAST_BOXES)
+        return distances
+
+    def _share_distances(
+        self, picture: Picture, boxes: Float[np.ndarray, "N 4"], pattern: Pattern
+    ) -> Float[np.ndarray, " N"]:
         if self.options.backend == "compiled":
             sampling, color = self.options.sampling, self.options.color
             image, code = picture.image, coding(color, picture.gain)

@@ -5,8 +5,9 @@ Chen, Eq. 11), and over the parts of the target by their weights; its root is Tr
 """
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
 from itertools import pairwise
+from operator import add
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -30,8 +31,13 @@ class Pattern:
 
     book: Codebook
     scale: Float[np.ndarray, " K"]
-    ends: Int[np.ndarray, " P1"]
+    ends: tuple[int, ...]
     perfect: Float[np.ndarray, " P"]
+
+    @cached_property
+    def total(self) -> float:
+        """The most that all parts together can contribute."""
+        return float(self.perfect.sum())
 
     @cached_property
     def compiled(self) -> Compiled:
@@ -52,7 +58,7 @@ def pattern_of(appearance: Appearance, options: ColorOptions, *, all_bins: bool 
     book = full_codebook(options) if all_bins else codebook(q * omega > 0, options.parts)
     weights = np.array(options.part_weights) / book.n_channels
     scale = (omega * np.sqrt(q))[book.codes < len(book.part)] * weights[book.part]
-    ends = np.searchsorted(book.part, np.arange(len(weights) + 1))
+    ends = tuple(np.searchsorted(book.part, np.arange(len(weights) + 1)).tolist())
     return Pattern(book, scale, ends, weights * (omega * q).sum(axis=(1, 2)))
 
 
@@ -66,13 +72,11 @@ def coefficients(
     counts: Int[np.ndarray, "N K"], pixels: Int[np.ndarray, "N P"], pattern: Pattern
 ) -> Float[np.ndarray, " N"]:
     """Sums up Σ_p w_p Σ_b ω √(h q) of each box, h = counts / pixels."""
-    terms, of_box = counts.T.astype(float), pixels.T
-    np.sqrt(terms, out=terms)
+    terms = np.sqrt(counts.T, dtype=float)
     terms *= pattern.scale[:, None]
-    total = np.zeros(len(counts))
-    for part, (first, last) in enumerate(pairwise(pattern.ends)):
-        total += _sum_in_order(terms[first:last]) / np.sqrt(np.maximum(of_box[part], 1))
-    return total
+    roots = np.sqrt(np.maximum(pixels.T, 1))
+    of_parts = (_sum_in_order(terms[first:last]) for first, last in pairwise(pattern.ends))
+    return reduce(add, (of_part / root for of_part, root in zip(of_parts, roots, strict=True)))
 
 
 def _sum_in_order(terms: Float[np.ndarray, "k N"]) -> Float[np.ndarray, " N"]:
@@ -96,11 +100,9 @@ def squared_distances(
         pixels: Of each part that are in the picture.
         pattern: The reference.
     """
-    seen = pixels.T > 0
-    total = float(pattern.perfect.sum())
-    if total > 0 and seen.all():
-        return 1 - coefficient / total
+    if pattern.total > 0 and pixels.all():
+        return 1 - coefficient / pattern.total
     # Σ_p w_p Σ_b ω q over the parts that are in the picture
-    perfect = (pattern.perfect[:, None] * seen).sum(axis=0)
+    perfect = (pattern.perfect[:, None] * (pixels.T > 0)).sum(axis=0)
     known = perfect > 0
     return np.asarray(1 - np.where(known, coefficient, 0) / np.where(known, perfect, 1))

@@ -106,34 +106,36 @@ def project_boxes(
         left, top, right, bottom in pixels, pixel edges at whole numbers; NaN where the target cannot be
         pictured from there, or would be less than two pixels high.
     """
+    # One row a coordinate, and the boxes' sides likewise: NumPy is quick along the long axis only.
     if target.size_px is not None:
-        middle, half = positions + 0.5, 0.5 * np.array(target.size_px)
-        return np.concatenate((middle - half, middle + half), axis=1)
+        middle, half = np.add(positions.T, 0.5, order="C"), 0.5 * np.array(target.size_px)[:, None]
+        return np.concatenate((middle - half, middle + half)).T
     n, n_axes = positions.shape
-    body = np.empty((2, n, 3))
-    body[:, :, :n_axes] = positions
-    foot, head = body
+    body = np.empty((3, 2, n))
+    body[:n_axes] = positions.T[:, None]
+    foot, head = body[2]
     if target.space == "plane":
-        foot[:, 2] = target.plane_height
+        foot[:] = target.plane_height
     else:
-        foot[:, 2] -= target.height / 2
-    head[:, 2] = foot[:, 2] + target.height
-    pixels, depths = camera.project(body.reshape(2 * n, 3))
-    low, high = pixels[:n] + 0.5, pixels[n:] + 0.5
-    middle = (low + high) / 2
+        foot -= target.height / 2
+    np.add(foot, target.height, out=head)
+    pixels, depths = camera.project(body.reshape(3, 2 * n).T)
+    low, high = pixels.T[:, :n], pixels.T[:, n:]
+    middle = (low + high) / 2 + 0.5
     # A slanted or rolled view shortens the body but not its thickness: a box is at least as wide as it,
     # and nearly as high.
     trunk = 0.5 * camera.K[0, 0] * target.width / np.maximum((depths[:n] + depths[n:]) / 2, 1e-6)
-    half = np.maximum(0.5 * np.abs(low - high), trunk[:, None] * _TRUNK_ASPECT)
-    boxes = np.concatenate((middle - half, middle + half), axis=1)
-    boxes[~(half[:, 1] > 1.0)] = np.nan
-    return boxes
+    half = np.maximum(0.5 * np.abs(low - high), trunk * _TRUNK_ASPECT[:, None])
+    boxes = np.concatenate((middle - half, middle + half))
+    np.copyto(boxes, np.nan, where=~(half[1] > 1.0))
+    return boxes.T
 
 
 def visible_fraction(boxes: Float[np.ndarray, "N 4"], camera: Camera) -> Float[np.ndarray, " N"]:
     """The part of each box that lies inside the picture, 0 to 1."""
-    left, top, right, bottom = boxes.T
-    inside_x = np.maximum(np.minimum(right, camera.width_px) - np.maximum(left, 0.0), 0.0)
-    inside_y = np.maximum(np.minimum(bottom, camera.height_px) - np.maximum(top, 0.0), 0.0)
-    fraction = inside_x * inside_y / ((right - left) * (bottom - top))
+    low, high = boxes.T[:2], boxes.T[2:]
+    size_px = np.array([[camera.width_px], [camera.height_px]])
+    width, height = np.maximum(np.minimum(high, size_px) - np.maximum(low, 0.0), 0.0)
+    whole_width, whole_height = high - low
+    fraction = width * height / (whole_width * whole_height)
     return np.fmax(fraction, 0.0)  # of a box that cannot be pictured, NaN, nothing

@@ -102,7 +102,7 @@ def run_fusion(problem, motion, n, seed, options):
             resample_if_degenerate(result.particles, THRESHOLD, rng)
             for result, rng in zip(results, local_rngs, strict=True)
         ]
-        average = np.mean([pack(result, options) for result in results], axis=0)
+        average = np.mean([pack(result, N_CAMERAS, options) for result in results], axis=0)
         fused = unpack(average, N_CAMERAS, 4, options)
         posteriors = [
             fuse(clouds[c], predicted[c], fused, motion, options, rngs[c]) for c in range(N_CAMERAS)
@@ -135,6 +135,8 @@ CASES = {
     FusionOptions(rule="eq17", proposal="prior", local_particles="own"): (300, 0.2),
     FusionOptions(rule="eq17", proposal="prior"): (300, 0.2),
     FusionOptions(rule="eq17", proposal="optimal"): (300, 0.2),
+    FusionOptions(rule="hybrid"): (130, 0.1),
+    FusionOptions(rule="icf"): (130, 0.1),
 }
 
 
