@@ -50,8 +50,7 @@ class SmartCamera:
         Args:
             model: The camera's observation model.
             setup: What the run tracks.
-            lanes: Its part of the averaging, which knows who takes part: one, or so many that as many frames'
-                rounds may overlap.
+            lanes: Its part of the averaging, one for each of the frames whose rounds may overlap.
             single: The camera's own filter beside, as a baseline.
         """
         self.name = model.camera.name
@@ -151,7 +150,7 @@ class SmartCamera:
         }
 
     def waiting_for(self, frame: int) -> tuple[str, ...]:
-        """Neighbours without whose message a frame cannot go on; none when it is done."""
+        """Neighbours that a frame waits for; none when it is done."""
         return self._rounds.of(frame).waiting_for() if frame in self._frames else ()
 
     @property
@@ -173,11 +172,9 @@ class SmartCamera:
 
     @property
     def counters(self) -> Counters:
-        """What it has counted.
+        """Frames in which the local or the fused difference of information matrices was no density's (Eq. 17).
 
-        Frames in which the local (`indefinite_local`) or the fused (`indefinite_fused`) difference of
-        information matrices was not positive semidefinite, so that Eq. 17 had no density; messages of the
-        rounds that were of no use, by reason (`unused`); what a frame costs on the emulated array (`simd`).
+        And messages of no use, by reason (`unused`); what a frame costs on the emulated array (`simd`).
         """
         report = self._array_report
         return {
