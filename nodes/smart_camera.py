@@ -87,13 +87,11 @@ class SmartCamera:
         # predict: χ(k) ~ P(χ(k) | χ(k-1))
         previous, predicted = self._predict(index)
         # reweight by the own picture: u, p, v, r
-        fresh = is_new(image, self._image)
-        self._image = image
+        fresh, self._image = is_new(image, self._image), image
         local = self._filter_locally(picture, predicted, self._appearance if fresh else None)
         self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
         self._frames[index] = FrameInProgress(index, picture, self._done_frame, previous, predicted, fresh)
-        # as many as were there when it was last heard of
         packed = pack(local, len(self._rounds.of(index).members), self._setup.fusion)
         return self._with_result(self._rounds.begin(index, packed))
 
@@ -172,9 +170,10 @@ class SmartCamera:
 
     @property
     def counters(self) -> Counters:
-        """Frames in which the local or the fused difference of information matrices was no density's (Eq. 17).
+        """What it has counted, by name.
 
-        And messages of no use, by reason (`unused`); what a frame costs on the emulated array (`simd`).
+        Frames in which the local or fused difference of information matrices was no density's (Eq. 17);
+        messages of no use, by reason (`unused`); what a frame costs on the emulated array (`simd`).
         """
         report = self._array_report
         return {
@@ -261,7 +260,7 @@ class SmartCamera:
 
     def _begin(self, image: UInt8[np.ndarray, "H W 3"]) -> Outgoing:
         """Frame 0: the target's looks, averaged over the cameras that see it at the start."""
-        self._model = self._model.with_first(image)
+        self._model, self._image = self._model.with_first(image), image
         picture = self._model.look(image)
         position = self._setup.start.moments.position().mean
         self._appearance = self._model.first_appearance(picture, position)

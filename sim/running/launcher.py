@@ -154,7 +154,7 @@ class Launch:
     def _order(self, children: Children, what: str, whom: str) -> None:
         self._recorder.event(what, whom, frame=self._frames_done)
         self._absent_since.pop(whom, None)
-        self._killed.discard(whom)
+        self._killed -= {whom}
         children.do(what, whom)
 
     def _messages(self, children: Children) -> Iterator[Heard | None]:
@@ -192,12 +192,12 @@ class Launch:
             if absence.end is None:
                 self._recorder.forget(name)
                 settled.add(name)
+        if not all(map(self._orders.excuses, working - settled)):
+            return settled
         # the others are done: no fault's end is waited for
-        if all(map(self._orders.excuses, working - settled)):
-            for what, whom in self._orders.close():
-                self._order(children, what, whom)
-            settled |= self._killed
-        return settled
+        for what, whom in self._orders.close():
+            self._order(children, what, whom)
+        return settled | self._killed
 
     def _stuck(self, working: set[str]) -> set[str]:
         """Nodes that are there but have told nothing since everybody was waited for: spinning, or hung."""
@@ -290,13 +290,10 @@ def _decode(node: str, kind: str, data: bytes) -> Heard:
     Raises:
         RefusedMessage: It is something else, or of somebody else.
     """
-    message: Heard
-    if kind == "estimate":
-        message = codec.decode_public(EstimateMessage, data)
-    elif kind == "preview":
-        message = codec.decode_preview(data)
+    if kind == "preview":
+        message: Heard = codec.decode_preview(data)
     else:
-        message = codec.decode_public(StatusMessage, data)
+        message = codec.decode_public(EstimateMessage if kind == "estimate" else StatusMessage, data)
     if message.node != node:
         raise RefusedMessage("sender")
     return message
