@@ -290,10 +290,13 @@ def _decode(node: str, kind: str, data: bytes) -> Heard:
     Raises:
         RefusedMessage: It is something else, or of somebody else.
     """
-    if kind == "preview":
-        message: Heard = codec.decode_preview(data)
+    message: Heard
+    if kind == "estimate":
+        message = codec.decode_public(EstimateMessage, data)
+    elif kind == "preview":
+        message = codec.decode_preview(data)
     else:
-        message = codec.decode_public(EstimateMessage if kind == "estimate" else StatusMessage, data)
+        message = codec.decode_public(StatusMessage, data)
     if message.node != node:
         raise RefusedMessage("sender")
     return message
