@@ -6,12 +6,14 @@ Messages between nodes are little-endian and begin with one header of 24 bytes:
 |---|---|---|
 | 0 | u8 | version of this layout, 1 |
 | 1 | u8 | kind in the lower four bits: 1 consensus, 2 pixels, 3 confirm |
-|   |    | encoding in the upper four: consensus: 0 float64, 1 float32, 2 float16; others 0 |
+|   |    | encoding in the next three: consensus: 0 float64, 1 float32, 2 float16; others 0 |
+|   |    | highest bit: consensus: whether links are told to be down; others 0 |
 | 2 | 3 x u16 | consensus: numbers in the payload K, round, sender's degree; pixels: height, width, 0 |
 | 8 | u64 | run: BLAKE2b of its name, 8 bytes |
 | 16 | u32 | sender: BLAKE2b of its name, 4 bytes |
 | 20 | u32 | frame |
-| 24 | | consensus: K numbers, float16 ones after an i16 e and times 2^e; pixels: height x width x 3, BGR |
+| 24 | | consensus: K numbers, float16 ones after an i16 e and times 2^e, then 2 x u32 for each link that is |
+|    | | down, its number and a frame; pixels: height x width x 3, BGR |
 
 A preview is a JPEG that any viewer shows; what else it says is JSON in the picture's comment.
 
@@ -22,7 +24,6 @@ import json
 import struct
 from dataclasses import replace
 from functools import lru_cache
-from hashlib import blake2b
 from typing import Any, TypeVar
 
 import numpy as np
@@ -31,6 +32,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from network import jpeg
 from network.errors import RefusedMessage
+from network.header import HEADER, TELLS_DOWN, read_header, write_header
 from network.messages import (
     ConfirmMessage,
     ConsensusMessage,
@@ -41,29 +43,28 @@ from network.messages import (
     PixelsMessage,
     PreviewMessage,
     PublicMessage,
+    StateMessage,
     StatusMessage,
     TruthMessage,
 )
 from network.quantization import ENCODINGS, LARGEST, Encoding, half_exponent
 
-VERSION = 1
 MAX_PIXELS = 64_000_000
 MAX_JSON_BYTES = 1_000_000
 MAX_JPEG_BYTES = 20_000_000
 MAX_MAGNITUDE = LARGEST["float64"]
 """Larger numbers are refused like infinity: sums and products of them would overflow."""
 
-_HEADER = struct.Struct("<BBHHHQII")
 _NUMBERS: dict[Encoding, np.dtype[np.floating]] = {
     "float64": np.dtype("<f8"),
     "float32": np.dtype("<f4"),
     "float16": np.dtype("<f2"),
 }
 _EXPONENT = struct.Struct("<h")
-_KINDS: dict[type[PeerMessage], int] = {ConsensusMessage: 1, PixelsMessage: 2, ConfirmMessage: 3}
+_DOWN = struct.Struct("<II")
 _JSON: dict[type, TypeAdapter[Any]] = {
     kind: TypeAdapter(kind)
-    for kind in (EstimateMessage, ControlMessage, StatusMessage, TruthMessage, PreviewMessage)
+    for kind in (EstimateMessage, ControlMessage, StateMessage, StatusMessage, TruthMessage, PreviewMessage)
 }
 _JSON_REASONS = {"json_invalid": "json", "finite_number": "not-finite", "value_error": "shape"}
 
@@ -119,12 +120,14 @@ def encode_consensus(run: str, message: ConsensusMessage) -> bytes:
         raise ValueError(
             f"{message.sender} has a value that is not finite in frame {message.frame}: {payload}"
         )
-    header = _header(run, message, payload.size, message.round, message.degree, message.encoding)
+    code = ENCODINGS.index(message.encoding) << 4 | (TELLS_DOWN if message.down else 0)
+    header = write_header(run, message, payload.size, message.round, message.degree, code)
     scale = b""
     if message.encoding == "float16":
         exponent = half_exponent(payload)
         payload, scale = np.ldexp(payload, -exponent), _EXPONENT.pack(exponent)
-    return header + scale + payload.astype(_NUMBERS[message.encoding], copy=False).tobytes()
+    numbers = payload.astype(_NUMBERS[message.encoding], copy=False).tobytes()
+    return header + scale + numbers + b"".join(_DOWN.pack(*report) for report in message.down)
 
 
 def decode_consensus(run: str, sender: str, data: bytes) -> ConsensusMessage:
@@ -133,9 +136,12 @@ def decode_consensus(run: str, sender: str, data: bytes) -> ConsensusMessage:
     Raises:
         RefusedMessage: The data are not such a message.
     """
-    frame, size, round_, degree, encoding = _read_header(ConsensusMessage, run, sender, data)
-    number, start = _NUMBERS[encoding], _HEADER.size + _EXPONENT.size * (encoding == "float16")
-    if len(data) != start + number.itemsize * size:
+    frame, size, round_, degree, code = read_header(ConsensusMessage, run, sender, data)
+    encoding = ENCODINGS[code >> 4 & 0x07]
+    number, start = _NUMBERS[encoding], HEADER.size + _EXPONENT.size * (encoding == "float16")
+    end = start + number.itemsize * size
+    told = len(data) - end
+    if told % _DOWN.size or told < 0 or (told > 0) != bool(code & TELLS_DOWN):
         raise RefusedMessage("length")
     if round_ < 1:
         raise RefusedMessage("round")
@@ -144,19 +150,20 @@ def decode_consensus(run: str, sender: str, data: bytes) -> ConsensusMessage:
         payload = payload.astype(float)
         if encoding == "float16":
             # an exponent beyond all floats gives infinity, which is refused
-            (exponent,) = _EXPONENT.unpack_from(data, _HEADER.size)
+            (exponent,) = _EXPONENT.unpack_from(data, HEADER.size)
             with np.errstate(over="ignore", invalid="ignore"):
                 payload = np.ldexp(payload, exponent)
         payload.flags.writeable = False
     if not _usable(payload):
         raise RefusedMessage("not-finite")
-    return ConsensusMessage(sender, frame, round_, degree, payload, encoding)
+    down = tuple(_DOWN.iter_unpack(data[end:])) if told else ()
+    return ConsensusMessage(sender, frame, round_, degree, payload, encoding, down)
 
 
 def encode_pixels(run: str, message: PixelsMessage) -> bytes:
     """A picture in bytes."""
     height, width, _ = message.image.shape
-    return b"".join((_header(run, message, height, width, 0), np.ascontiguousarray(message.image).data))
+    return b"".join((write_header(run, message, height, width, 0), np.ascontiguousarray(message.image).data))
 
 
 def decode_pixels(run: str, sender: str, data: bytes) -> PixelsMessage:
@@ -165,18 +172,18 @@ def decode_pixels(run: str, sender: str, data: bytes) -> PixelsMessage:
     Raises:
         RefusedMessage: The data are not such a message, or the picture has more than ``MAX_PIXELS``.
     """
-    frame, height, width, *_ = _read_header(PixelsMessage, run, sender, data)
+    frame, height, width, *_ = read_header(PixelsMessage, run, sender, data)
     if not 0 < height * width <= MAX_PIXELS:
         raise RefusedMessage("size")
-    if len(data) != _HEADER.size + 3 * height * width:
+    if len(data) != HEADER.size + 3 * height * width:
         raise RefusedMessage("length")
-    image = np.frombuffer(data, np.uint8, offset=_HEADER.size).reshape(height, width, 3)
+    image = np.frombuffer(data, np.uint8, offset=HEADER.size).reshape(height, width, 3)
     return PixelsMessage(sender, frame, image)
 
 
 def encode_confirm(run: str, message: ConfirmMessage) -> bytes:
     """A confirmation in bytes."""
-    return _header(run, message, 0, 0, 0)
+    return write_header(run, message, 0, 0, 0)
 
 
 def decode_confirm(run: str, sender: str, data: bytes) -> ConfirmMessage:
@@ -185,8 +192,8 @@ def decode_confirm(run: str, sender: str, data: bytes) -> ConfirmMessage:
     Raises:
         RefusedMessage: The data are not such a message.
     """
-    frame, *_ = _read_header(ConfirmMessage, run, sender, data)
-    if len(data) != _HEADER.size:
+    frame, *_ = read_header(ConfirmMessage, run, sender, data)
+    if len(data) != HEADER.size:
         raise RefusedMessage("length")
     return ConfirmMessage(sender, frame)
 
@@ -285,32 +292,3 @@ def _usable(payload: Float[np.ndarray, " K"]) -> bool:
     """Whether all numbers are finite and small enough to compute with; not so for NaN."""
     # A round has so few that Python's own numbers are faster than NumPy's.
     return all(-MAX_MAGNITUDE <= number <= MAX_MAGNITUDE for number in payload.tolist())
-
-
-@lru_cache
-def _digest(name: str, size: int) -> int:
-    return int.from_bytes(blake2b(name.encode(), digest_size=size).digest(), "little")
-
-
-def _header(run: str, message: PeerMessage, a: int, b: int, c: int, encoding: Encoding = "float64") -> bytes:
-    code = _KINDS[type(message)] | ENCODINGS.index(encoding) << 4
-    return _HEADER.pack(VERSION, code, a, b, c, _digest(run, 8), _digest(message.sender, 4), message.frame)
-
-
-def _read_header(
-    kind: type[PeerMessage], run: str, sender: str, data: bytes
-) -> tuple[int, int, int, int, Encoding]:
-    """Frame, the three numbers that depend on the kind, and the encoding of the payload."""
-    if len(data) < _HEADER.size:
-        raise RefusedMessage("length")
-    version, code, a, b, c, run_id, sender_id, frame = _HEADER.unpack_from(data)
-    if version != VERSION:
-        raise RefusedMessage("version")
-    encoding = code >> 4
-    if code & 0x0F != _KINDS[kind] or encoding >= (len(ENCODINGS) if kind is ConsensusMessage else 1):
-        raise RefusedMessage("kind")
-    if run_id != _digest(run, 8):
-        raise RefusedMessage("run")
-    if sender_id != _digest(sender, 4):
-        raise RefusedMessage("sender")
-    return frame, a, b, c, ENCODINGS[encoding]

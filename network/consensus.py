@@ -5,13 +5,15 @@ one waited for will not come. A neighbour that keeps to the rounds is never more
 """
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from network.averaging.algorithm import Algorithm
+from network.graph import Graph
+from network.membership import Membership
 from network.messages import ConsensusMessage
 from network.quantization import Quantizer
 
@@ -34,8 +36,10 @@ class Consensus:
         name: The node.
         neighbors: Whom it exchanges messages with, sorted by name: the order in which they are summed.
         rounds_done: Rounds done in this frame.
+        rounds_in_all: Rounds done in all frames.
         done: Whether this frame's rounds are over.
-        counters: Messages that were of no use, by reason, and frames that were ``cut``.
+        counters: Messages that were of no use, by reason; those that came after their round and still served
+            (``late``); those that their round was done without (``missed``); frames that were ``cut``.
     """
 
     def __init__(
@@ -45,6 +49,7 @@ class Consensus:
         algorithm: Algorithm[Any],
         iterations: int,
         quantizer: Quantizer | None = None,
+        membership: Membership | None = None,
     ) -> None:
         """A node before its first frame.
 
@@ -54,14 +59,18 @@ class Consensus:
             algorithm: How they average, the same in all nodes.
             iterations: Rounds in each frame, at least 0.
             quantizer: Rounds what it sends; None for the full numbers.
+            membership: Who takes part, by the network's links; None where nobody wants to know.
         """
         self.name = name
         self.neighbors = tuple(sorted(neighbors))
-        self.rounds_done = 0
+        self.rounds_done = self.rounds_in_all = 0
         self.done = True
         self.counters: Counter[str] = Counter()
         self._algorithm, self._iterations = algorithm, iterations
         self._quantizer = quantizer or Quantizer()
+        self._membership = membership or Membership(
+            name, Graph((name, *self.neighbors), frozenset()), iterations
+        )
         self._state: Any = None  # of the algorithm's own type; None before the first frame
         self._said: ConsensusMessage  # in this round
         self._position = _NOWHERE
@@ -75,6 +84,21 @@ class Consensus:
     def value(self) -> Float[np.ndarray, " K"]:
         """The estimate, after the rounds done so far, of the average over all nodes."""
         return np.empty(0) if self._state is None else self._state.value
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """The nodes that take part in this frame, as far as it is known here, sorted by name."""
+        return self._membership.members(max(self._position[0], 0))
+
+    @property
+    def gone(self) -> tuple[str, ...]:
+        """The neighbours that it goes on without, sorted by name."""
+        return tuple(sorted(self._gone))
+
+    @property
+    def heard(self) -> Mapping[str, int]:
+        """The latest frame in which each neighbour has spoken, -1 for one that never has."""
+        return {name: frame for name, (frame, _) in self._heard.items()}
 
     def begin(self, frame: int, value: Float[np.ndarray, " K"]) -> tuple[ConsensusMessage, ...]:
         """Starts a frame with the node's own value.
@@ -108,6 +132,7 @@ class Consensus:
             self.counters["old"] += 1
         else:
             self._heard[sender] = position
+            self._membership.hear(message.down, message.frame)
             self._keep(message)
         return self._advance()
 
@@ -119,10 +144,8 @@ class Consensus:
 
     def drop(self, neighbor: str) -> tuple[ConsensusMessage, ...]:
         """Goes on without a neighbour from now on; what it has said for this round still counts."""
-        _, round_ = self._position
         self._gone.add(neighbor)
-        self._absent.add(neighbor)
-        self._inbox.pop((round_ + 1, neighbor), None)
+        self._leave_out(neighbor)
         return self._advance()
 
     def restore(self, neighbor: str) -> None:
@@ -133,7 +156,7 @@ class Consensus:
         """Does this round without those that are late; they take part in the next one."""
         if self.done:
             return ()
-        self.counters["late"] += len(self.waiting_for())
+        self.counters["missed"] += len(self.waiting_for())
         self._step()
         return self._enter_round(self._position[0]) + self._advance()
 
@@ -142,6 +165,14 @@ class Consensus:
         if not self.done:
             self.counters["cut"] += 1
             self._finish()
+
+    def _leave_out(self, neighbor: str) -> None:
+        """Does without a neighbour for the rest of the frame, and says so."""
+        frame, round_ = self._position
+        self._absent.add(neighbor)
+        self._inbox.pop((round_ + 1, neighbor), None)
+        if not self.done:
+            self._membership.lose(neighbor, frame)
 
     def _present(self) -> tuple[str, ...]:
         """The neighbours that take part in this frame: neither gone nor already in a later one."""
@@ -166,21 +197,36 @@ class Consensus:
             self.counters["ahead"] += 1
         elif message.sender in self._absent:
             self.counters["absent"] += 1
+        elif self._membership.is_down(message.sender, frame):
+            # The other end goes on without this node: so does this one without it.
+            self._leave_out(message.sender)
+            self.counters["absent"] += 1
         elif not self._algorithm.fits(self._state, message):
             self.counters["shape"] += 1
         else:
+            self.counters.update(["late"] * late)
             self._inbox[max(message.round, round_), message.sender] = message
 
     def _enter_round(self, frame: int) -> tuple[ConsensusMessage, ...]:
         """Enters the round after those done, or ends the frame where there is none or nobody to talk to."""
         round_ = self.rounds_done + 1
         self._position = (frame, round_)
-        degree = len(self._present())
-        if self.rounds_done == self._iterations or degree == 0:
+        present = self._present()
+        degree = len(present)
+        if not self.rounds_done and degree < len(self.neighbors):
+            for name in self._heard.keys() - present:
+                self._membership.lose(name, frame)
+        if self.rounds_done == self._iterations or (degree == 0 and (self.rounds_done or not self.neighbors)):
             self._finish()
             return ()
         payload = self._quantizer(self._algorithm.payload(self._state, degree))
-        self._said = ConsensusMessage(self.name, frame, round_, degree, payload, self._quantizer.encoding)
+        down = self._membership.reports(frame)
+        self._said = ConsensusMessage(
+            self.name, frame, round_, degree, payload, self._quantizer.encoding, down
+        )
+        if degree == 0:
+            # Said all the same: who is back hears that this node is there, and who waits for it need not.
+            self._finish()
         return (self._said,)
 
     def _advance(self) -> tuple[ConsensusMessage, ...]:
@@ -198,6 +244,7 @@ class Consensus:
         received = [message for message in found if message is not None]
         self._state = self._algorithm.step(self._state, self._said, received)
         self.rounds_done += 1
+        self.rounds_in_all += 1
 
     def _finish(self) -> None:
         """Ends the frame: what still comes for it is old."""

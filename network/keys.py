@@ -54,6 +54,11 @@ def status(run: str, node: str = ANY) -> str:
     return _of_node(run, node, "status")
 
 
+def state(run: str, node: str) -> str:
+    """Where a node answers a neighbour that was away with what it knows of the target."""
+    return _of_node(run, node, "state")
+
+
 def preview(run: str, node: str = ANY) -> str:
     """Where a camera shows its pictures, while somebody looks."""
     return _of_node(run, node, "preview")

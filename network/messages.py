@@ -43,6 +43,15 @@ Numbers = dict[str, int | float | dict[str, int | float]]
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 
+def _require_covariance(mean: np.ndarray, covariance: np.ndarray) -> None:
+    size = len(mean)
+    if covariance.shape != (size, size):
+        raise ValueError(f"covariance of shape {covariance.shape} does not fit a mean of {size} numbers")
+    scale = np.abs(covariance).max(initial=0.0)
+    if not np.allclose(covariance, covariance.T, rtol=0, atol=1e-9 * scale):
+        raise ValueError("covariance is not symmetric")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ConsensusMessage:
     """A node's value in one round of consensus.
@@ -54,6 +63,7 @@ class ConsensusMessage:
         degree: How many neighbours the sender has in this round.
         payload: Its value after the rounds before this one, in the form that its algorithm gives it.
         encoding: How the payload's numbers are written; they are such as it holds exactly.
+        down: Links that were down: their numbers, each with a frame (`network.membership`).
     """
 
     kind: ClassVar[str] = "consensus"
@@ -63,6 +73,7 @@ class ConsensusMessage:
     degree: int
     payload: Float[np.ndarray, " K"]
     encoding: Encoding = "float64"
+    down: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,14 +142,34 @@ class EstimateMessage:
     members: tuple[Name, ...]
 
     def __post_init__(self) -> None:
-        size = len(self.mean)
-        if self.covariance.shape != (size, size):
-            raise ValueError(
-                f"covariance of shape {self.covariance.shape} does not fit a mean of {size} numbers"
-            )
-        scale = np.abs(self.covariance).max(initial=0.0)
-        if not np.allclose(self.covariance, self.covariance.T, rtol=0, atol=1e-9 * scale):
-            raise ValueError("covariance is not symmetric")
+        _require_covariance(self.mean, self.covariance)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StateMessage:
+    """What a node knows of the target after a frame: an answer for a neighbour that was away.
+
+    Attributes:
+        node: The node.
+        frame: Frame of the run.
+        mean: State as in its estimates.
+        covariance: Of the state.
+        looks: What the target looks like to it, as the cameras exchange it in frame 0.
+
+    Raises:
+        ValueError: The shapes do not fit, or the covariance is not symmetric.
+    """
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    kind: ClassVar[str] = "state"
+    node: Name
+    frame: Frame
+    mean: Vector
+    covariance: Matrix
+    looks: Annotated[Float[np.ndarray, " K"], _json_array(list[float]), _AsLists]
+
+    def __post_init__(self) -> None:
+        _require_covariance(self.mean, self.covariance)
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,7 +277,7 @@ class TruthMessage:
 PeerMessage = ConsensusMessage | PixelsMessage | ConfirmMessage
 """What nodes say to each other, in bytes."""
 
-PublicMessage = EstimateMessage | ControlMessage | StatusMessage | TruthMessage
+PublicMessage = EstimateMessage | StateMessage | ControlMessage | StatusMessage | TruthMessage
 """What everybody may read, in JSON."""
 
 Message = PeerMessage | PublicMessage | PreviewMessage

@@ -19,6 +19,7 @@ from network.messages import (
     PeerMessage,
     PixelsMessage,
     PreviewMessage,
+    StateMessage,
     StatusMessage,
 )
 
@@ -84,11 +85,15 @@ class Traffic:
         messages: Messages sent, by kind. One to d receivers counts d times; a public one once.
         bytes: Their payloads in bytes, counted likewise.
         refused: Peers' messages that could not be used, by reason.
+        sent: Messages of the rounds to each neighbour that was there.
+        received: Messages of the rounds that arrived from each neighbour, those that came twice twice.
     """
 
     messages: Counter[str] = field(default_factory=Counter)
     bytes: Counter[str] = field(default_factory=Counter)
     refused: Counter[str] = field(default_factory=Counter)
+    sent: Counter[str] = field(default_factory=Counter)
+    received: Counter[str] = field(default_factory=Counter)
 
     def count(self, kind: str, size_bytes: int, receivers: int) -> None:
         """Counts a message of one kind that is sent."""
@@ -141,6 +146,12 @@ class Transport(Protocol):
         Returns:
             Its message, None when time is up or the sender is gone.
         """
+
+    def offer(self, state: StateMessage) -> None:
+        """Keeps what this node knows, for neighbours that ask."""
+
+    def ask(self, name: str, timeout_s: float) -> StateMessage | None:
+        """What another node knows, None where it does not answer in time or has nothing to tell."""
 
     def close(self) -> None:
         """Leaves the network, within seconds whatever the others do."""

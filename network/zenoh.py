@@ -17,6 +17,7 @@ import zenoh
 from zenoh import CongestionControl, Locality, Priority
 
 from network import codec, keys, sessions
+from network.answers import Answers
 from network.errors import RefusedMessage
 from network.messages import (
     ConfirmMessage,
@@ -26,6 +27,7 @@ from network.messages import (
     PeerMessage,
     PixelsMessage,
     PreviewMessage,
+    StateMessage,
     StatusMessage,
     TruthMessage,
 )
@@ -39,6 +41,8 @@ _ENCODINGS = {
 }
 _PREVIEW_ENCODING = "image/jpeg"
 _WATCH_PERIOD_S = 0.01
+_WATCH_CLOSELY_S = 0.002
+"""The watchdog's period while somebody waits whose time is nearly up."""
 _WAKE_UP = b""
 
 _Inbox = zenoh.Subscriber[zenoh.handlers.Handler[zenoh.Sample]]
@@ -83,7 +87,6 @@ class ZenohTransport:
         self._alive: set[str] = set()
         self._alive_changed = threading.Condition()
         self._orders: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-        self._latest: dict[str, bytes] = {}
         self._wait: tuple[str, float] | None = None
         self._closed = threading.Event()
         self._session = sessions.open_peer(listen, connect)
@@ -131,16 +134,16 @@ class ZenohTransport:
         """Sends a message of this node to whom it concerns."""
         data = codec.encode(self._run, message)
         if isinstance(message, PeerMessage):
-            receivers = sum(name in self._alive for name in self._links.receivers(message))
+            receivers = [name for name in self._links.receivers(message) if name in self._alive]
+            self.counters.count(message.kind, len(data), len(receivers))
+            if isinstance(message, ConsensusMessage):
+                self.counters.sent.update(receivers)
         else:
-            receivers = 1
-        self.counters.count(message.kind, len(data), receivers)
+            self.counters.count(message.kind, len(data), 1)
         publisher = self._publishers[type(message)]
         # those who ask want the joint estimate, not that of one camera on its own
-        if isinstance(message, StatusMessage) or (
-            isinstance(message, EstimateMessage) and message.estimator != "single"
-        ):
-            self._latest[str(publisher.key_expr)] = data
+        if isinstance(message, StatusMessage) or getattr(message, "estimator", "single") != "single":
+            self._answers.keep(str(publisher.key_expr), data)
         publisher.put(data)
 
     def receive(self, sender: str, timeout_s: float) -> PeerMessage | None:
@@ -158,11 +161,23 @@ class ZenohTransport:
                 if data == _WAKE_UP:
                     continue
                 try:
-                    return codec.decode(self._heard[sender], self._run, sender, data)
+                    message = codec.decode(self._heard[sender], self._run, sender, data)
                 except RefusedMessage as refusal:
                     self.counters.refuse(sender, refusal.reason)
+                    continue
+                if isinstance(message, ConsensusMessage):
+                    self.counters.received[sender] += 1
+                return message
         finally:
             self._wait = None
+
+    def offer(self, state: StateMessage) -> None:
+        """Keeps what this node knows, for neighbours that ask."""
+        self._answers.offer(state)
+
+    def ask(self, name: str, timeout_s: float) -> StateMessage | None:
+        """What another node knows, None where it does not answer in time or has nothing to tell."""
+        return self._answers.ask(name, timeout_s)
 
     def close(self) -> None:
         """Leaves the network, within seconds whatever the others do."""
@@ -174,19 +189,11 @@ class ZenohTransport:
         return self._session.declare_subscriber(self._inbox_keys[sender], zenoh.handlers.RingChannel(depth))
 
     def _declare_orders(self) -> None:
-        """Hears orders to the run, and answers those who ask for the latest status and estimate."""
         self._session.declare_subscriber(keys.control(self._run), zenoh.handlers.Callback(self._on_order))
-        for key in (keys.status(self._run, self._name), keys.estimate(self._run, self._name)):
-            self._session.declare_queryable(key, zenoh.handlers.Callback(partial(self._answer, key)))
+        self._answers = Answers(self._session, self._run, self._name, self.counters)
 
     def _on_order(self, sample: zenoh.Sample) -> None:
         self._orders.put(sample.payload.to_bytes())
-
-    def _answer(self, key: str, query: zenoh.Query) -> None:
-        # Under the node's own key: the question may be a wildcard.
-        with query:
-            if key in self._latest:
-                query.reply(key, self._latest[key])
 
     def _declare_publishers(self, *, drop_late_pixels: bool) -> dict[type, zenoh.Publisher]:
         run, name = self._run, self._name
@@ -242,8 +249,11 @@ class ZenohTransport:
     def _watch(self) -> None:
         """Wakes the waiting node when its time is up."""
         woken = None
-        while not self._closed.wait(_WATCH_PERIOD_S):
+        period_s = _WATCH_PERIOD_S
+        while not self._closed.wait(period_s):
             wait = self._wait
+            left_s = _WATCH_PERIOD_S if wait is None else wait[1] - time.monotonic()
+            period_s = _WATCH_CLOSELY_S if left_s < _WATCH_PERIOD_S else _WATCH_PERIOD_S
             if wait is None or wait is woken:
                 continue
             sender, deadline = wait

@@ -40,12 +40,16 @@ class Central:
         self._frame = 0
 
     def on_message(self, message: PixelsMessage) -> Outgoing:
-        """A camera's picture has come: of this frame, or of one soon after if the camera had to skip some."""
-        if message.sender not in self._cameras:
+        """A camera's picture has come: of this frame, or of one soon after if the camera had to skip some.
+
+        A camera that was gone is counted on again.
+        """
+        if message.sender not in self._models:
             return ()
         camera = self._models[message.sender].camera
         fits = message.image.shape[:2] == (camera.height_px, camera.width_px)
         if fits and 0 <= message.frame - self._frame <= MAX_AHEAD:
+            self._cameras.add(message.sender)
             self._newest[message.sender] = message.frame
             self._images.setdefault(message.frame, {})[message.sender] = message.image
         return self._while_complete()

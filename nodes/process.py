@@ -6,9 +6,7 @@ A node's life is four lines: announce, wait for the start, one frame after the o
 import math
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
 from threading import Event
-from typing import Literal
 
 import numpy as np
 from jaxtyping import UInt8
@@ -22,6 +20,8 @@ from network.messages import (
 )
 from network.transport import Links, Transport
 from nodes.central import Central
+from nodes.pace import Pace
+from nodes.returning import LEAD, Returning
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
 from nodes.telemetry import Counters, State, Telemetry
@@ -32,21 +32,8 @@ REPORT_PERIOD_S = 1.0
 """How often a node tells how it is, while somebody looks."""
 PATIENCE_S = 0.25
 """How long a wait lasts at most before the shell looks whether it has been told to stop."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pace:
-    """When frames begin and end.
-
-    Attributes:
-        kind: `lockstep` or `realtime`.
-        rate_hz: Frames a second.
-        deadline_s: In lockstep, how long a frame waits for a message before its sender counts as gone.
-    """
-
-    kind: Literal["lockstep", "realtime"]
-    rate_hz: float
-    deadline_s: float
+TURN_S = 0.005
+"""How long it waits for one frame's messages where the rounds of several are under way."""
 
 
 class Shell:
@@ -77,10 +64,14 @@ class Shell:
         self.transport.announce()
         while not self.stopped:
             missing = self.transport.wait_until_alive(linked, PATIENCE_S)
-            if not missing:
+            # Where a run is under way, those that are missing may be so for good.
+            ready = not missing or any(
+                self.transport.ask(name, PATIENCE_S) for name in linked if name not in missing
+            )
+            if ready:
                 # Said again until the start, for a launcher that comes later.
                 self.report("ready", -1, {})
-            order = self.transport.wait_for_control(0 if missing else PATIENCE_S)
+            order = self.transport.wait_for_control(PATIENCE_S if ready else 0)
             if order is not None:
                 return self._obey(order)
         return False
@@ -111,19 +102,22 @@ class Shell:
         if order is not None and order.action == "stop":
             self._stopped.set()
         if self.pace.kind == "realtime":
-            early = self._start_s + index / self.pace.rate_hz - time.time()
+            early = self.begins_in_s(index)
             if early < -1 / self.pace.rate_hz and index > 0:
                 self.telemetry.late += 1
                 return False
             self._stopped.wait(max(0.0, early))
         return not self.stopped
 
-    def deadline(self, index: int) -> float:
-        """When a frame that begins now has to be done, on the monotonic clock."""
+    def begins_in_s(self, index: int) -> float:
+        """How long it is until a frame's time; in lockstep, frames begin at once."""
         if self.pace.kind == "lockstep":
-            return time.monotonic() + self.pace.deadline_s
-        left = self._start_s + (index + 1) / self.pace.rate_hz - time.time()
-        return time.monotonic() + left
+            return 0.0
+        return self._start_s + self.pace.begin_s(index) - time.time()
+
+    def began(self, index: int) -> float:
+        """When a frame that begins now is taken to have begun, on the monotonic clock."""
+        return time.monotonic() + self.begins_in_s(index)
 
     def show(self, node: SmartCamera, index: int, image: UInt8[np.ndarray, "H W 3"]) -> None:
         """Shows a frame that is done to those who look, if anybody does."""
@@ -155,10 +149,19 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
     if not shell.wait_for_start(links.neighbors + links.sinks):
         return
     confirmed, done = -1.0, -1
-    for index in range(shell.frames):
-        if not shell.await_frame(index):
+    begun: dict[int, float] = {}
+    returning = Returning(shell.transport, links.neighbors, shell.pace)
+    index, state = 0, returning.newest()
+    while index < shell.frames:
+        # who was away goes on ahead of the others
+        if state is not None:
+            index = max(index, state.frame + LEAD)
+        if index >= shell.frames or not shell.await_frame(index):
+            index += 1
             continue
         image = source.read(index) if index else first
+        if state is not None:
+            node.on_return(image, state)
         # pixels to the central node, which confirms them in lockstep
         if links.sinks:
             if shell.pace.kind == "lockstep":
@@ -169,36 +172,65 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         outgoing = node.on_frame(index, image)
         shell.telemetry.local_filter_s.append(time.perf_counter() - began)
         # rounds with the neighbours, and the fusion filter at their end
-        began = time.perf_counter()
         _send(outgoing, shell)
-        _rounds(node, shell.deadline(index), shell)
-        shell.telemetry.consensus_round_s.append((time.perf_counter() - began) / max(node.rounds_done, 1))
-        done = done if shell.stopped else index
-        if index == 0:
+        begun[index] = shell.began(index)
+        begun = {each: begun[each] for each in node.open_rounds}
+        _rounds(node, begun, shell, frame=index + 1)
+        shell.transport.offer(node.state)
+        if done < 0 and not shell.stopped:
             shell.report("running", index, node.counters)
+        done = done if shell.stopped else index
         shell.show(node, index, image)
+        index += 1
+        state = returning.missed(node, index)
+    _rounds(node, begun, shell)
     source.close()
     shell.report("failed" if shell.stopped else "done", done, node.counters)
     shell.wait_for_stop()
 
 
-def _rounds(node: SmartCamera, deadline: float, shell: Shell) -> None:
-    """Passes messages between the neighbours and the node until the frame is done."""
-    while node.waiting_for and not shell.stopped:
-        neighbor = node.waiting_for[0]
-        left = deadline - time.monotonic()
-        message = shell.transport.receive(neighbor, min(max(left, 0.0), PATIENCE_S))
-        if isinstance(message, ConsensusMessage):
-            _send(node.on_message(message), shell)
-        elif not shell.transport.alive(neighbor):
-            _send(node.on_lost(neighbor), shell)
-        elif left <= 0 and shell.pace.kind == "realtime":
+def _rounds(node: SmartCamera, begun: dict[int, float], shell: Shell, frame: int | None = None) -> None:
+    """Passes messages between the neighbours and the node until its frames are done.
+
+    Args:
+        node: The node.
+        begun: When its frames began, on the monotonic clock.
+        shell: Its shell.
+        frame: In real time, the frame at whose time the rounds of those before it are left for later.
+    """
+    began, rounds = time.perf_counter(), node.rounds_done
+    realtime = shell.pace.kind == "realtime"
+    while (under_way := list(node.open_rounds)) and not shell.stopped:
+        left_s = shell.begins_in_s(frame) if frame is not None and realtime else PATIENCE_S
+        if left_s <= 0:
+            break
+        for index in under_way:
+            patience_s = min(left_s, PATIENCE_S if len(under_way) == 1 else TURN_S)
+            _wait(node, index, begun[index], patience_s, shell)
+    # those of which the time is up
+    for index in list(node.open_rounds):
+        if frame is not None and index + shell.pace.lag_frames < frame:
             shell.telemetry.late += 1
-            _send(node.on_deadline(), shell)
-        elif left <= 0:
-            _send(node.on_lost(neighbor), shell)
-            # Those that waited for it as well have a budget of their own.
-            deadline = time.monotonic() + shell.pace.deadline_s
+            _send(node.on_deadline(index), shell)
+    rounds = max(node.rounds_done - rounds, 1)
+    shell.telemetry.consensus_round_s.append((time.perf_counter() - began) / rounds)
+
+
+def _wait(node: SmartCamera, index: int, begun: float, patience_s: float, shell: Shell) -> None:
+    """Waits for the next message of a frame, or for the end of the round that it is in."""
+    round_ = node.open_rounds.get(index)
+    if round_ is None:
+        return
+    neighbor = node.waiting_for(index)[0]
+    deadline = begun + shell.pace.round_deadline_s(round_)
+    left_s = max(deadline - time.monotonic(), 0.0)
+    message = shell.transport.receive(neighbor, min(left_s, patience_s))
+    if isinstance(message, ConsensusMessage):
+        _send(node.on_message(message), shell)
+    elif not shell.transport.alive(neighbor):
+        _send(node.on_lost(neighbor), shell)
+    elif time.monotonic() >= deadline:
+        _send(node.on_round_deadline(index), shell)
 
 
 def _await_confirmation(sink: str, frame: int, confirmed: float, shell: Shell) -> float:
@@ -216,14 +248,16 @@ def _await_confirmation(sink: str, frame: int, confirmed: float, shell: Shell) -
     return confirmed
 
 
-def run_central(node: Central, shell: Shell) -> None:
+def run_central(node: Central, links: Links, shell: Shell) -> None:
     """The life of the central node."""
     if not shell.wait_for_start(node.cameras):
         return
     while node.frame < shell.frames and node.cameras and not shell.stopped:
         index = node.frame
         shell.await_frame(index)
-        deadline = shell.deadline(index)
+        # cameras that were gone and send again
+        _read(node, set(links.cameras) - node.cameras, shell)
+        deadline = shell.began(index) + shell.pace.budget_s
         while node.frame == index and node.cameras and not shell.stopped:
             camera = node.waiting_for[0]
             left = deadline - time.monotonic()
@@ -235,13 +269,25 @@ def run_central(node: Central, shell: Shell) -> None:
                     shell.telemetry.local_filter_s.append(time.perf_counter() - began)
             elif not shell.transport.alive(camera) or (left <= 0 and shell.pace.kind == "lockstep"):
                 _send(node.on_lost(camera), shell)
-                deadline = shell.deadline(index)
+                deadline = shell.began(index) + shell.pace.budget_s
             elif left <= 0:
                 shell.telemetry.late += 1
-                _send(node.on_deadline(), shell)
+                # those behind the one that was waited for
+                _read(node, node.waiting_for, shell)
+                if node.frame == index:
+                    _send(node.on_deadline(), shell)
         shell.report_now_and_then(node.frame - 1, {})
     shell.report("done" if node.frame == shell.frames else "failed", node.frame - 1, {})
     shell.wait_for_stop()
+
+
+def _read(node: Central, cameras: Iterable[str], shell: Shell) -> None:
+    """Takes what has come from cameras, without waiting."""
+    for camera in sorted(cameras):
+        if shell.transport.alive(camera):
+            message = shell.transport.receive(camera, 0)
+            if isinstance(message, PixelsMessage):
+                _send(node.on_message(message), shell)
 
 
 def _send(messages: Iterable[ConsensusMessage | EstimateMessage | ConfirmMessage], shell: Shell) -> None:

@@ -11,7 +11,7 @@ from network.streams import stream
 from nodes.filtering.fusion import FusionOptions
 from nodes.filtering.gaussian import Moments
 from nodes.filtering.motion import DynamicsOptions, MotionModel, motion_model
-from nodes.filtering.particles import Particles, sample_gaussian
+from nodes.filtering.particles import Particles, sample_gaussian, sample_moments
 from nodes.vision.observation import ObservationOptions
 from nodes.vision.target import TargetOptions
 
@@ -80,6 +80,10 @@ class TrackingSetup:
     def stream(self, *names: str) -> np.random.Generator:
         """The random stream of a filter, by its node's and its own name."""
         return stream(self.seed, *names)
+
+    def particles(self, known: Moments, rng: np.random.Generator) -> Particles:
+        """Particles around a state that is known from elsewhere."""
+        return sample_moments(known.mean, known.covariance, self.filter.n_particles, rng)
 
     def first_particles(self, rng: np.random.Generator) -> Particles:
         """Particles around the start."""

@@ -5,13 +5,13 @@ a camera lives in this file, in the order in which it happens (Jing & Chen, sect
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
 from network.consensus import Consensus
-from network.messages import ConsensusMessage, EstimateMessage, PreviewMessage
+from network.messages import ConsensusMessage, EstimateMessage, PreviewMessage, StateMessage
 from nodes.array_estimator import ArrayEstimator
 from nodes.estimator import SirEstimator
 from nodes.filtering.fusion import fuse, is_density, left_of, pack, propagate, unpack
@@ -19,7 +19,9 @@ from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.local import LocalResult, local_filter
 from nodes.filtering.particles import Particles, effective_sample_size, resample_if_degenerate
 from nodes.filtering.sighting import Sighting
+from nodes.frame import FrameInProgress, is_new
 from nodes.preview import preview
+from nodes.rounds import Rounds
 from nodes.setup import TrackingSetup
 from nodes.simd.report import FrameReport
 from nodes.telemetry import Counters
@@ -27,15 +29,6 @@ from nodes.vision.appearance import Appearance, pack_looks, settled, unpack_look
 from nodes.vision.observation import ObservationModel, Picture
 
 Outgoing = tuple[ConsensusMessage | EstimateMessage, ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FrameInProgress:
-    """What a camera keeps of a frame while its neighbours' messages come in."""
-
-    index: int
-    picture: Picture
-    predicted: Particles
 
 
 class SmartCamera:
@@ -49,8 +42,7 @@ class SmartCamera:
         self,
         model: ObservationModel,
         setup: TrackingSetup,
-        consensus: Consensus,
-        cameras: tuple[str, ...],
+        lanes: Sequence[Consensus],
         single: SirEstimator | ArrayEstimator | None = None,
     ) -> None:
         """A camera before its first frame.
@@ -58,13 +50,12 @@ class SmartCamera:
         Args:
             model: The camera's observation model.
             setup: What the run tracks.
-            consensus: Its part of the averaging.
-            cameras: The cameras of the network.
+            lanes: Its part of the averaging, one for each of the frames whose rounds may overlap.
             single: The camera's own filter beside, as a baseline.
         """
         self.name = model.camera.name
         self._indefinite: Counter[str] = Counter(indefinite_local=0, indefinite_fused=0)
-        self._model, self._setup, self._consensus, self._cameras = model, setup, consensus, set(cameras)
+        self._model, self._setup, self._rounds = model, setup, Rounds(lanes)
         self._motion = setup.motion
         self._fusion_rng = setup.stream(self.name, "fusion")
         self._local_rng = setup.stream(self.name, "local")
@@ -72,8 +63,11 @@ class SmartCamera:
         self._local_particles = setup.first_particles(self._local_rng)
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
-        self._frame: FrameInProgress | None = None
+        self._image: UInt8[np.ndarray, "H W 3"] | None = None
+        self._estimate = setup.start.moments
+        self._frames: dict[int, FrameInProgress] = {}
         self._last_frame = 0
+        self._done_frame = 0
         self._single = single
 
     def on_frame(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> Outgoing:
@@ -88,31 +82,57 @@ class SmartCamera:
         picture = self._model.look(image)
         # frames that were left out, for want of time, move the particles all the same
         for _ in range(self._last_frame + 1, index):
-            self._particles = propagate(self._particles, self._motion, self._fusion_rng)
             self._local_particles = propagate(self._local_particles, self._motion, self._local_rng)
         self._last_frame = index
         # predict: χ(k) ~ P(χ(k) | χ(k-1))
-        predicted = propagate(self._particles, self._motion, self._fusion_rng)
+        previous, predicted = self._predict(index)
         # reweight by the own picture: u, p, v, r
-        local = self._filter_locally(picture, predicted)
+        fresh, self._image = is_new(image, self._image), image
+        local = self._filter_locally(picture, predicted, self._appearance if fresh else None)
         self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
-        self._frame = FrameInProgress(index, picture, predicted)
-        packed = pack(local, len(self._cameras), self._setup.fusion)
-        return self._with_result(self._consensus.begin(index, packed))
+        self._frames[index] = FrameInProgress(index, picture, self._done_frame, previous, predicted, fresh)
+        packed = pack(local, len(self._rounds.of(index).members), self._setup.fusion)
+        return self._with_result(self._rounds.begin(index, packed))
 
     def on_message(self, message: ConsensusMessage) -> Outgoing:
-        """A neighbour's value of a round has come."""
-        return self._with_result(self._consensus.receive(message))
+        """A neighbour's value of a round has come; one that was gone is counted on again."""
+        return self._with_result(self._rounds.receive(message))
+
+    def on_return(self, image: UInt8[np.ndarray, "H W 3"], state: StateMessage) -> None:
+        """The camera was away: it goes on with what a neighbour knows.
+
+        Args:
+            image: What it sees now; the gain is measured against it where nothing was seen before.
+            state: The neighbour's state, of a frame before the next one.
+        """
+        setup = self._setup
+        if len(state.mean) != len(setup.start.mean):
+            return
+        known = Moments(state.mean, state.covariance)
+        self._particles = setup.particles(known, self._fusion_rng)
+        self._local_particles = setup.particles(known, self._local_rng)
+        self._rounds.cut()
+        self._frames.clear()
+        self._last_frame = self._done_frame = state.frame
+        self._sighting = Sighting()
+        if self._appearance is None:
+            self._model = self._model.with_first(image)
+            self._appearance = unpack_looks(state.looks, setup.filter.color)
+            # its own filter, the baseline, has nobody to ask
+            self._single = None
 
     def on_lost(self, neighbor: str) -> Outgoing:
         """A neighbour is gone: the rounds go on without it."""
-        self._cameras.discard(neighbor)
-        return self._with_result(self._consensus.drop(neighbor))
+        return self._with_result(self._rounds.lose(neighbor))
 
-    def on_deadline(self) -> Outgoing:
-        """The frame's time is up: what the rounds have reached must do."""
-        self._consensus.cut()
+    def on_round_deadline(self, frame: int) -> Outgoing:
+        """The time of a frame's round is up: it is done without those that are late."""
+        return self._with_result(self._rounds.expire(frame))
+
+    def on_deadline(self, frame: int) -> Outgoing:
+        """A frame's time is up: what the rounds have reached must do."""
+        self._rounds.of(frame).cut()
         return self._with_result(())
 
     def preview(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> PreviewMessage:
@@ -121,23 +141,44 @@ class SmartCamera:
         return preview(run, self.name, index, time_s, image, self._particles)
 
     @property
-    def waiting_for(self) -> tuple[str, ...]:
-        """Neighbours without whose message the frame cannot go on; none when it is done."""
-        return self._consensus.waiting_for()
+    def open_rounds(self) -> Mapping[int, int]:
+        """Frames whose rounds are not over, from the oldest on, and the round, from 1, that each is in."""
+        return {
+            frame: lane.rounds_done + 1 for frame in self._frames if not (lane := self._rounds.of(frame)).done
+        }
+
+    def waiting_for(self, frame: int) -> tuple[str, ...]:
+        """Neighbours that a frame waits for; none when it is done."""
+        return self._rounds.of(frame).waiting_for() if frame in self._frames else ()
+
+    @property
+    def heard(self) -> Mapping[str, int]:
+        """The latest frame in which each neighbour has spoken, -1 for one that never has."""
+        return self._rounds.heard
+
+    @property
+    def state(self) -> StateMessage:
+        """What a neighbour that was away needs to know."""
+        looks = pack_looks(self._appearance, self._setup.filter.color)
+        mean, covariance = self._estimate.mean, self._estimate.covariance
+        return StateMessage(self.name, self._done_frame, mean, covariance, looks)
+
+    @property
+    def rounds_done(self) -> int:
+        """Rounds of consensus done since the first frame."""
+        return self._rounds.done
 
     @property
     def counters(self) -> Counters:
-        """What it has counted.
+        """What it has counted, by name.
 
-        Frames in which the local (`indefinite_local`) or the fused (`indefinite_fused`) difference of
-        information matrices was not positive semidefinite, so that Eq. 17 had no density; and messages
-        of the rounds that were of no use, by reason (`unused`); the cost of a frame on the emulated array
-        (`simd`), if there is one.
+        Frames in which the local or fused difference of information matrices was no density's (Eq. 17);
+        messages of no use, by reason (`unused`); what a frame costs on the emulated array (`simd`).
         """
         report = self._array_report
         return {
             **self._indefinite,
-            "unused": dict(self._consensus.counters),
+            "unused": self._rounds.counters,
             **({"simd": report.figures} if report else {}),
         }
 
@@ -148,26 +189,30 @@ class SmartCamera:
             return self._single.report
         return self._model.processor.report if self._model.processor else None
 
-    @property
-    def rounds_done(self) -> int:
-        """Rounds of consensus done in the frame."""
-        return self._consensus.rounds_done
-
     def _with_result(self, messages: tuple[ConsensusMessage, ...]) -> Outgoing:
-        """The messages of the rounds, and the estimates once the rounds are over."""
-        frame = self._frame
-        if frame is None or not self._consensus.done:
-            return messages
-        self._frame = None
-        estimates = self._finish_first(frame) if frame.index == 0 else self._finish(frame)
-        return (*messages, *estimates)
+        """The messages of the rounds, and the estimates of the frames whose rounds are over."""
+        outgoing: Outgoing = messages
+        while self._frames and self._rounds.of(index := min(self._frames)).done:
+            frame = self._frames.pop(index)
+            outgoing += self._finish(frame) if index else self._finish_first(frame)
+            self._done_frame = index
+        return outgoing
 
-    def _filter_locally(self, picture: Picture, predicted: Particles) -> LocalResult:
+    def _predict(self, index: int) -> tuple[Particles, Particles]:
+        """The particles of the last frame that is done, moved to the frame before this one, and to it."""
+        previous = self._particles
+        for _ in range(self._done_frame + 1, index):
+            previous = propagate(previous, self._motion, self._fusion_rng)
+        return previous, propagate(previous, self._motion, self._fusion_rng)
+
+    def _filter_locally(
+        self, picture: Picture, predicted: Particles, appearance: Appearance | None
+    ) -> LocalResult:
         """Eq. 9-14 on the fusion filter's particles, or on the local filter's own."""
         own = self._setup.fusion.local_particles == "own"
         if own:
             predicted = propagate(self._local_particles, self._motion, self._local_rng)
-        log_likelihoods = self._model.log_likelihoods(picture, predicted.positions, self._appearance)
+        log_likelihoods = self._model.log_likelihoods(picture, predicted.positions, appearance)
         result = local_filter(predicted, log_likelihoods)
         if own:
             options = self._setup.filter
@@ -178,24 +223,27 @@ class SmartCamera:
 
     def _finish(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
         """The second half of a frame: the fusion filter on the network's average."""
-        setup = self._setup
+        setup, previous, predicted = self._setup, frame.previous, frame.predicted
+        # frames that were under way then are done by now
+        if frame.since != self._done_frame:
+            previous, predicted = self._predict(frame.index)
         # sum: N times the average (Eq. 15-16)
-        fused = unpack(self._consensus.value, len(self._cameras), len(setup.start.mean), setup.fusion)
+        lane = self._rounds.of(frame.index)
+        fused = unpack(lane.value, len(lane.members), len(setup.start.mean), setup.fusion)
         self._indefinite["indefinite_fused"] += not fused.is_density
         # reweight, from the prior or the optimal proposal (Eq. 17)
-        posterior = fuse(
-            self._particles, frame.predicted, fused, self._motion, setup.fusion, self._fusion_rng
-        )
+        posterior = fuse(previous, predicted, fused, self._motion, setup.fusion, self._fusion_rng)
         # estimate
         estimate = moments(posterior.states, posterior.weights)
+        self._estimate = estimate
         ess = effective_sample_size(posterior)
-        prior = moments(frame.predicted.states, frame.predicted.weights)
+        prior = moments(predicted.states, predicted.weights)
         self._sighting = self._sighting.after(left_of(prior, fused))
         # resample
         threshold, n_threads = setup.filter.resampling.threshold, setup.filter.threads
         self._particles = resample_if_degenerate(posterior, threshold, self._fusion_rng, n_threads)
         # update the reference (Eq. 4)
-        visible = self._update_appearance(frame.picture, estimate.position().mean)
+        visible = frame.fresh and self._update_appearance(frame.picture, estimate.position().mean)
         message = self._message(frame, estimate, ess, visible=visible)
         if self._single is None:
             return (message,)
@@ -212,18 +260,18 @@ class SmartCamera:
 
     def _begin(self, image: UInt8[np.ndarray, "H W 3"]) -> Outgoing:
         """Frame 0: the target's looks, averaged over the cameras that see it at the start."""
-        self._model = self._model.with_first(image)
+        self._model, self._image = self._model.with_first(image), image
         picture = self._model.look(image)
         position = self._setup.start.moments.position().mean
         self._appearance = self._model.first_appearance(picture, position)
-        self._frame = FrameInProgress(0, picture, self._particles)
+        self._frames[0] = FrameInProgress(0, picture, 0, self._particles, self._particles)
         looks = pack_looks(self._appearance, self._setup.filter.color)
-        return self._with_result(self._consensus.begin(0, looks))
+        return self._with_result(self._rounds.begin(0, looks))
 
     def _finish_first(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
         """A camera that saw nothing, or something else, takes the looks that the others saw."""
         color = self._setup.filter.color
-        self._appearance = settled(self._appearance, unpack_looks(self._consensus.value, color), color)
+        self._appearance = settled(self._appearance, unpack_looks(self._rounds.of(0).value, color), color)
         visible = self._appearance is not None and self._appearance.own
         n = float(self._setup.filter.n_particles)
         message = self._message(frame, self._setup.start.moments, n, visible=visible)
@@ -247,6 +295,6 @@ class SmartCamera:
             visible=visible,
             lost=self._sighting.lost,
             ess=ess,
-            iterations=self._consensus.rounds_done,
-            members=tuple(sorted(self._cameras)),
+            iterations=self._rounds.of(frame.index).rounds_done,
+            members=self._rounds.of(frame.index).members,
         )

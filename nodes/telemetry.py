@@ -54,6 +54,8 @@ class Telemetry:
                 "messages": dict(traffic.messages),
                 "bytes": dict(traffic.bytes),
                 "refused": dict(traffic.refused),
+                "sent": dict(traffic.sent),
+                "received": dict(traffic.received),
             },
             timing={name: value for name, value in timing.items() if value},
         )

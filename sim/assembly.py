@@ -11,6 +11,7 @@ from jaxtyping import Float, UInt8
 from network.averaging.algorithm import Algorithm
 from network.consensus import Consensus
 from network.graph import Graph
+from network.membership import Membership
 from network.messages import TruthMessage, Visibility
 from network.streams import stream
 from network.transport import Links, links_of
@@ -19,11 +20,13 @@ from nodes.camera import Camera
 from nodes.central import Central
 from nodes.counting.build import load_kernel
 from nodes.estimator import SirEstimator
+from nodes.pace import Pace
 from nodes.setup import Start, TrackingSetup
 from nodes.simd.likelihood import SimdLikelihood
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
 from nodes.vision.observation import ObservationModel
+from sim.faults.pictures import with_faults
 from sim.scenario.loading import cameras_of, video_source
 from sim.scenario.model import Scenario
 from sim.scenario.parsing import ScenarioError
@@ -75,6 +78,30 @@ class Assembly:
     def links(self) -> Mapping[str, Links]:
         """The nodes, the central one last if there is one, and whom each exchanges messages with."""
         return links_of(self.graph, [self.scenario.central.name] if self.scenario.baselines.cpf else [])
+
+    @property
+    def pace(self) -> Pace:
+        """When frames and rounds begin and end."""
+        network = self.scenario.network
+        return Pace(
+            self.scenario.pace,
+            self.scenario.rate_hz,
+            network.deadline_s,
+            network.iterations,
+            self.scenario.lag_frames,
+        )
+
+    def require_real_links(self) -> None:
+        """Checks that the run can be one of processes, whose links are what they are.
+
+        Raises:
+            ScenarioError: The scenario says what links do.
+        """
+        if not self.scenario.network.conditions.are_perfect:
+            raise ScenarioError(
+                f"{self.scenario.name}: network.conditions act in virtual time: add --in-process, or take"
+                " them out, for real links are what they are"
+            )
 
     def prepare(self) -> None:
         """Works out what all nodes share, before they part."""
@@ -205,8 +232,17 @@ class Assembly:
         return SmartCamera(
             self.model_on_camera(name),
             self.setup,
-            Consensus(name, neighbors, self.algorithm, network.iterations, quantizer),
-            self.graph.names,
+            [
+                Consensus(
+                    name,
+                    neighbors,
+                    self.algorithm,
+                    network.iterations,
+                    quantizer,
+                    Membership(name, self.graph, network.iterations),
+                )
+                for _ in range(1 + self.scenario.lag_frames)
+            ],
             self.single(name),
         )
 
@@ -221,9 +257,19 @@ class Assembly:
         Raises:
             SourceError: Its video cannot be read.
         """
-        if self.world is not None:
-            return RenderedSource(self.world, self.cameras[camera], self.scenario.rate_hz)
-        return video_source(self.scenario, camera)
+        if self.world is None:
+            source: FrameSource = video_source(self.scenario, camera)
+        else:
+            source = self._render(self.cameras[camera])
+        return with_faults(source, self.cameras[camera], self.scenario.faults, self._render)
+
+    def _render(self, camera: Camera) -> RenderedSource:
+        if self.world is None:
+            raise ValueError(f"{self.scenario.name} has no rendered world")
+        try:
+            return RenderedSource(self.world, camera, self.scenario.rate_hz)
+        except ValueError as error:
+            raise ScenarioError(f"{self.scenario.name}: {error}") from error
 
     def truth_message(self, frame: int, *, with_visibility: bool = True) -> TruthMessage | None:
         """The truth of a frame, or None where nobody knows it.

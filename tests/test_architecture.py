@@ -32,7 +32,10 @@ PURE = (
             "camera.py",
             "central.py",
             "estimator.py",
+            "frame.py",
+            "pace.py",
             "preview.py",
+            "rounds.py",
             "setup.py",
             "smart_camera.py",
         )
@@ -44,13 +47,17 @@ PURE = (
             *("report/elements.py", "report/figures.py", "report/run_tables.py", "report/stills.py"),
             "report/svg.py",
             *("recording/foxglove.py", "recording/scene.py", "recording/schemas.py"),
+            *("faults/options.py", "faults/pictures.py", "faults/schedule.py"),
         )
     ),
     *(
         ROOT / "network" / name
         for name in (
-            *("codec.py", "consensus.py", "errors.py", "graph.py", "jpeg.py", "keys.py", "memory.py"),
+            *("codec.py", "conditions.py", "consensus.py", "errors.py", "graph.py", "header.py"),
+            *("jpeg.py", "keys.py"),
             *(
+                "membership.py",
+                "memory.py",
                 "messages.py",
                 "options.py",
                 "quantization.py",

@@ -37,7 +37,7 @@ class FiniteTime(AlgorithmOptions):
         Raises:
             ValueError: There are fewer rounds than the graph needs; unfinished, they promise nothing.
         """
-        roots = leja_order(np.array(spectrum_of(graph).eigenvalues))
+        roots = roots_of(graph)
         if iterations < len(roots):
             raise ValueError(
                 f"iterations = {iterations} is too few for finite_time, which needs {len(roots)} rounds on"
@@ -45,6 +45,11 @@ class FiniteTime(AlgorithmOptions):
             )
         degrees = {name: graph.degree(name) for name in graph.names}
         return TunedFiniteTime(tuple(roots.tolist()), degrees)
+
+
+def roots_of(graph: Graph) -> Float[np.ndarray, " K"]:
+    """One eigenvalue a round, in their order: as many as there are rounds to go."""
+    return leja_order(np.array(spectrum_of(graph).eigenvalues))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -48,6 +48,19 @@ def sample_gaussian(
     return Particles(states, uniform_log_weights(n_particles))
 
 
+def sample_moments(
+    mean: Float[np.ndarray, " D"],
+    covariance: Float[np.ndarray, "D D"],
+    n_particles: int,
+    rng: np.random.Generator,
+) -> Particles:
+    """Equally weighted particles of a Gaussian, whose covariance may be singular."""
+    # P = V diag(λ) Vᵀ, x = m + V diag(√λ) z
+    variances, V = np.linalg.eigh(covariance)
+    noise = rng.standard_normal((n_particles, len(mean))) * np.sqrt(np.maximum(variances, 0.0))
+    return Particles(mean + noise @ V.T, uniform_log_weights(n_particles))
+
+
 def uniform_log_weights(n_particles: int) -> Float[np.ndarray, " N"]:
     """log(1/n) for each of n particles."""
     return np.full(n_particles, -np.log(n_particles))

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from sim.assembly import Assembly
-from sim.commands.shared import AsJson, Overrides, ScenarioPath, read_scenario
+from sim.commands.shared import AsJson, Overrides, ScenarioPath, read_scenario, tell_advice
 from sim.experiments.options import ExperimentOptions
 from sim.footage import fetch
 from sim.scenario.model import SPACES, Scenario
@@ -22,6 +22,7 @@ def check(scenario: ScenarioPath, overrides: Overrides = None, as_json: AsJson =
     chosen = read_scenario(scenario, overrides)
     assembly = Assembly(chosen)
     start = assembly.start
+    tell_advice(chosen)
     facts: dict[str, Any] = {
         "scenario": chosen.name,
         "preset": chosen.preset,

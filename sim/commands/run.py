@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -24,6 +24,7 @@ from sim.commands.shared import (
     length_text,
     progress_bar,
     read_scenario,
+    tell_advice,
     yes_no,
 )
 from sim.running.in_process import run_in_process
@@ -68,6 +69,9 @@ def run(
     # What is wrong with the start or the truth shall be said before anything is written.
     _ = assembly.start, assembly.truth
     _check_by_hand(by_hand or [], assembly, in_process=in_process)
+    if not in_process:
+        assembly.require_real_links()
+    tell_advice(chosen)
     if live and in_process:
         raise typer.BadParameter("with --in-process, nothing goes over the network", param_hint="--live")
     with ExitStack() as stack:
@@ -95,6 +99,10 @@ def run(
             results, dead = launch.run(), launch.dead
         summary = summarize(results, processes=1 if in_process else chosen.n_processes)
         summary |= {"died": dead, "sent_per_frame": sent_per_frame(results), "versions": versions()}
+        if in_process:
+            # The launcher has heard them come and go; here, the cameras' word for it must do.
+            for event in summary["members"]["events"]:
+                recorder.event(**event)
         recorder.finish(summary)
     if as_json:
         sys.stdout.write(json.dumps(summary) + "\n")
@@ -155,13 +163,33 @@ def _print(summary: dict[str, Any], scenario: Scenario, folder: Path) -> None:
         console.print(f"Eq. 17's ratio was no density in {indefinite:.0%} of the local results")
     if "simd" in summary:
         console.print(_array_text(summary["simd"], scenario.filter.simd.words), soft_wrap=True)
-    timing = summary["timing"]
+    for line in (*_trouble_lines(summary["network"]), *_timing_lines(summary["timing"])):
+        console.print(line)
+    _print_members(console, summary)
+    console.print(f"recorded in {folder}", soft_wrap=True)
+
+
+def _timing_lines(timing: dict[str, Any]) -> Iterator[str]:
     if "frames_per_s" in timing:
         first, rate = timing["first_estimate_s"], timing["frames_per_s"]
-        console.print(f"first estimate after {first:.1f} s, then {rate:.0f} frames/s")
+        yield f"first estimate after {first:.1f} s, then {rate:.0f} frames/s"
+
+
+def _trouble_lines(network: dict[str, Any]) -> Iterator[str]:
+    """What bad links have done, if they have."""
+    troubles = {"lost": "lost", "late_messages": "late", "duplicated": "duplicated", "dropped": "dropped"}
+    if any(network[key] for key in troubles):
+        counted = ", ".join(f"{network[key]:,} {text}" for key, text in troubles.items())
+        yield f"messages of the rounds: {counted}"
+    if network["lag_s"]:
+        yield f"estimates come {network['lag_s']:g} s after their pictures"
+
+
+def _print_members(console: Console, summary: dict[str, Any]) -> None:
+    for event in summary["members"]["events"]:
+        console.print(f"{event['node']} {event['event']} in frame {event['frame']}")
     if summary["died"]:
         console.print(f"did not reach the end: {', '.join(summary['died'])}")
-    console.print(f"recorded in {folder}", soft_wrap=True)
 
 
 def _array_text(cost: dict[str, float], words: int) -> str:

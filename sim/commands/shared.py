@@ -12,6 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from nodes.setup import FilterOptions
 from nodes.threads import n_shares
 from nodes.vision.observation import LEAST_BOXES
+from sim.scenario.advice import advice
 from sim.scenario.loading import load_scenario
 from sim.scenario.model import Scenario
 from sim.scenario.parsing import ScenarioError
@@ -97,6 +98,13 @@ def progress_bar(what: str, total: int) -> Iterator[Callable[[int], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(what, total=total)
         yield lambda done: progress.update(task, completed=done)
+
+
+def tell_advice(scenario: Scenario) -> None:
+    """Says on stderr what the scenario may not be meant to say."""
+    console = Console(stderr=True, highlight=False)
+    for sentence in advice(scenario):
+        console.print(f"dcpf: {scenario.name}: {sentence}", markup=False, soft_wrap=True)
 
 
 def length_text(value: float | None, unit: str) -> str:

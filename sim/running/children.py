@@ -72,6 +72,15 @@ class Children:
             raise RunFailed(f"the host of the run's processes ended: {self.last_words('host')}")
         return found
 
+    def do(self, what: str, whom: str) -> None:
+        """Orders a fault's end, or that of the router.
+
+        Args:
+            what: `wake` a node that is stopped, `start` one anew, `restart` the `router`.
+            whom: The node, or the router.
+        """
+        self._order(json.dumps({what: whom}).encode() + b"\n")
+
     def last_words(self, name: str) -> str:
         """The last line of a process's log."""
         path = self._logs / f"{name}.log"

@@ -10,6 +10,7 @@ host's pipe does. The host also owns the folder of the run's sockets.
 
 import json
 import logging
+import math
 import os
 import select
 import shutil
@@ -17,14 +18,17 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
+import zenoh
 
 from network import sessions
 from network.errors import NetworkError
 from nodes.sources import SourceError
 from sim.assembly import Assembly
+from sim.faults.schedule import absences
 from sim.running.endpoints import Endpoints, run_endpoints
 from sim.running.node import run_node, stop_on_signals
 from sim.scenario.loading import load_scenario
@@ -33,6 +37,8 @@ from sim.scenario.parsing import ScenarioError
 LEAVE_S = 3.0
 """How long a node has to leave by itself before it is ended."""
 POLL_S = 0.02
+ROUTER_AWAY_S = 0.5
+"""How long a router that is restarted is away."""
 
 _log = logging.getLogger(__name__)
 
@@ -60,20 +66,47 @@ def main() -> int:
     for name in endpoints.nodes:
         if name not in order["by_hand"]:
             nodes.fork(name)
+    for absence in absences(assembly.scenario.faults):
+        if absence.forgets and absence.end is not None and absence.node not in order["by_hand"]:
+            nodes.fork_spare(absence.node)
+    router = Router([endpoints.router, assembly.scenario.network.router])
     try:
-        session = sessions.open_router([endpoints.router, assembly.scenario.network.router])
+        router.open()
     except NetworkError as error:
         print(error, file=sys.stderr)  # noqa: T201 - the launcher reads it there
         nodes.end()
         return 2
     try:
         _tell(started=nodes.running)
-        _watch(nodes)
+        _watch(nodes, router)
         nodes.end()
     finally:
-        sessions.close(session)
+        router.close()
         shutil.rmtree(order["sockets"], ignore_errors=True)
     return 0
+
+
+class Router:
+    """The run's router."""
+
+    def __init__(self, listen: Sequence[str]) -> None:
+        """A router that is not there yet; `listen` is where it will be found."""
+        self._listen = listen
+        self._session: zenoh.Session | None = None
+
+    def open(self) -> None:
+        """Starts it.
+
+        Raises:
+            NetworkError: An endpoint cannot be had.
+        """
+        self._session = sessions.open_router(self._listen)
+
+    def close(self) -> None:
+        """Ends it."""
+        if self._session is not None:
+            sessions.close(self._session)
+            self._session = None
 
 
 class Nodes:
@@ -88,19 +121,51 @@ class Nodes:
             logs: Folder of their logs.
         """
         self.running: dict[str, int] = {}
+        self._spares: dict[str, list[tuple[int, int]]] = {}  # process, and the pipe that wakes it
         self._assembly, self._endpoints, self._logs = assembly, endpoints, logs
         self._there, self._here = os.pipe()
 
     def fork(self, name: str) -> None:
         """Starts a node."""
+        (self._logs / f"{name}.log").write_bytes(b"")
         pid = os.fork()
         if pid:
             self.running[name] = pid
             return
-        # From here on, this is the node's process.
+        os.close(self._here)
+        self._live(name)
+
+    def fork_spare(self, name: str) -> None:
+        """Forks a process now that will be a node later, when it is too late for a fork."""
+        there, here = os.pipe()
+        pid = os.fork()
+        if pid:
+            os.close(there)
+            self._spares.setdefault(name, []).append((pid, here))
+            return
+        # nobody but the host may hold a pipe whose end tells of the host's
+        for pipe in (self._here, here, *(pipe for spares in self._spares.values() for _, pipe in spares)):
+            os.close(pipe)
+        if not os.read(there, 1):
+            os._exit(0)  # the host has ended
+        self._live(name)
+
+    def start_spare(self, name: str) -> None:
+        """A spare process becomes the node."""
+        pid, pipe = self._spares[name].pop(0)
+        os.write(pipe, b"!")
+        os.close(pipe)
+        self.running[name] = pid
+
+    def wake(self, name: str) -> None:
+        """A node that is stopped goes on."""
+        if name in self.running:
+            os.kill(self.running[name], signal.SIGCONT)
+
+    def _live(self, name: str) -> None:
+        """From here on, this is the node's process."""
         code = 1
         try:
-            os.close(self._here)
             code = _be_node(name, self._assembly, self._endpoints, self._logs / f"{name}.log", self._there)
         except Exception:  # noqa: BLE001 - whatever it was, this process ends here and must say why
             _log.exception("node %s failed", name)
@@ -121,6 +186,9 @@ class Nodes:
     def end(self) -> None:
         """Ends them all: by closing their pipe, then by asking, then by force."""
         os.close(self._here)
+        for pid, pipe in [spare for spares in self._spares.values() for spare in spares]:
+            os.close(pipe)
+            os.waitpid(pid, 0)
         for number in (signal.SIGTERM, signal.SIGKILL):
             limit = time.monotonic() + LEAVE_S
             while self.running and time.monotonic() < limit:
@@ -133,7 +201,7 @@ class Nodes:
 def _be_node(name: str, assembly: Assembly, endpoints: Endpoints, log: Path, host: int) -> int:
     """The life of a forked node; returns its exit code."""
     os.setsid()
-    file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
+    file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(file, 1)
     os.dup2(file, 2)
@@ -161,12 +229,28 @@ def _stop_with_host(host: int, stopped: threading.Event) -> None:
     threading.Timer(LEAVE_S, os._exit, args=[1]).start()
 
 
-def _watch(nodes: Nodes) -> None:
-    """Tells who ends, until the launcher hangs up."""
+def _watch(nodes: Nodes, router: Router) -> None:
+    """Tells who ends and does what it is told, until the launcher hangs up."""
+    said, router_due = b"", math.inf
     while True:
         readable, _, _ = select.select([0], [], [], POLL_S)
-        if readable and not os.read(0, 1024):
-            return
+        if readable:
+            more = os.read(0, 1024)
+            if not more:
+                return
+            *lines, said = (said + more).split(b"\n")
+            for line in lines:
+                match json.loads(line):
+                    case {"wake": name}:
+                        nodes.wake(name)
+                    case {"start": name}:
+                        nodes.start_spare(name)
+                    case {"restart": "router"}:
+                        router.close()
+                        router_due = time.monotonic() + ROUTER_AWAY_S
+        if time.monotonic() >= router_due:
+            router.open()
+            router_due = math.inf
         for name, code in nodes.reap():
             _tell(ended=name, code=code)
 

@@ -15,6 +15,7 @@ from network.errors import RefusedMessage
 from network.messages import ControlMessage, EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from network.zenoh import publish
 from sim.assembly import Assembly
+from sim.faults.orders import Orders
 from sim.running.children import Children, RunFailed
 from sim.running.endpoints import run_endpoints
 from sim.running.recorder import Recorder, expected_tracks
@@ -71,6 +72,8 @@ class Launch:
         self._refused: set[tuple[str, str]] = set()
         self._truth_next = 0
         self._frames_done = 0
+        self._orders = Orders(assembly.scenario.faults)
+        self._killed: set[str] = set()  # by the scenario's faults, and not started again
 
     def run(self) -> Results:
         """Runs it all.
@@ -92,7 +95,8 @@ class Launch:
             children = stack.enter_context(
                 Children(recorded / "scenario.yaml", recorded / "logs", folder, self._by_hand)
             )
-            session = sessions.open_client(run_endpoints(self._assembly.scenario, folder, []).router)
+            endpoints = run_endpoints(self._assembly.scenario, folder, [])
+            session = sessions.open_client(endpoints.router, timeout_s=None)
             stack.callback(sessions.close, session)
             # However it ends, nodes that somebody else has started shall know.
             stack.callback(publish, session, self._assembly.scenario.name, ControlMessage("stop"))
@@ -106,6 +110,8 @@ class Launch:
             started = self._last_heard = time.monotonic()
             for message in self._messages(children):
                 self._take(message, session)
+                for what, whom in self._orders.due(self._frames_done):
+                    self._order(children, what, whom)
                 first = isinstance(message, EstimateMessage) and message.frame == 1
                 if first and "first_estimate_s" not in self.results.timing:
                     self.results.timing["first_estimate_s"] = round(time.monotonic() - self._began, 3)
@@ -142,7 +148,14 @@ class Launch:
     def _start(self, session: zenoh.Session) -> None:
         realtime = self._assembly.scenario.pace == "realtime"
         start_time_s = time.time() + LEAD_S if realtime else None
-        publish(session, self._assembly.scenario.name, ControlMessage("start", start_time_s))
+        self._start_order = ControlMessage("start", start_time_s)
+        publish(session, self._assembly.scenario.name, self._start_order)
+
+    def _order(self, children: Children, what: str, whom: str) -> None:
+        self._recorder.event(what, whom, frame=self._frames_done)
+        self._absent_since.pop(whom, None)
+        self._killed -= {whom}
+        children.do(what, whom)
 
     def _messages(self, children: Children) -> Iterator[Heard | None]:
         """What the nodes tell, until all have told their last, have died, or are heard of no more."""
@@ -157,14 +170,34 @@ class Launch:
             ended.update(children.ended())
             if not self._heard.empty():
                 continue  # what they said before is heard first
-            for name in sorted(working & ended.keys()):
-                code, last_words = ended[name], children.last_words(name)
-                self._bury(name, "died", f"died (exit code {code}): {last_words}", exit_code=code)
+            working -= self._settle(children, working, ended)
             for name in sorted((working - ended.keys()) & self._silent()):
                 self._bury(name, "silent", "is heard of no more")
             for name in sorted((working - ended.keys() - self._silent()) & self._stuck(working)):
                 self._bury(name, "stuck", "is there but tells nothing")
             working.difference_update(self.dead)
+
+    def _settle(self, children: Children, working: set[str], ended: dict[str, int]) -> set[str]:
+        """Tells of those whose processes have ended; returns who will not come back."""
+        settled = set()
+        for name in sorted(working & ended.keys()):
+            absence = self._orders.killed(name, ended[name])
+            if absence is None:
+                code, last_words = ended[name], children.last_words(name)
+                self._bury(name, "died", f"died (exit code {code}): {last_words}", exit_code=code)
+                continue
+            self._recorder.event("killed", name, frame=self._frames_done)
+            self._killed.add(name)
+            del ended[name]
+            if absence.end is None:
+                self._recorder.forget(name)
+                settled.add(name)
+        if not all(map(self._orders.excuses, working - settled)):
+            return settled
+        # the others are done: no fault's end is waited for
+        for what, whom in self._orders.close():
+            self._order(children, what, whom)
+        return settled | self._killed
 
     def _stuck(self, working: set[str]) -> set[str]:
         """Nodes that are there but have told nothing since everybody was waited for: spinning, or hung."""
@@ -174,7 +207,8 @@ class Launch:
     def _silent(self) -> set[str]:
         """Nodes that have been away for longer than anybody waits for them: stopped, or dead elsewhere."""
         limit = time.monotonic() - self._assembly.scenario.network.deadline_s
-        return {name for name, since in self._absent_since.items() if since < limit}
+        away = {name for name, since in self._absent_since.items() if since < limit}
+        return {name for name in away if not self._orders.excuses(name)}
 
     def _bury(self, name: str, event: str, what: str, **details: int) -> None:
         self.dead.append(name)
@@ -219,6 +253,8 @@ class Launch:
             return
         self.results.add(message)
         self._recorder.add(message)
+        if isinstance(message, StatusMessage) and message.state == "ready":  # the others have begun
+            publish(session, self._assembly.scenario.name, self._start_order)
         if isinstance(message, EstimateMessage) and message.frame >= self._frames_done:
             self._frames_done = message.frame + 1
             self._progress(self._frames_done)

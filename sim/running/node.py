@@ -8,8 +8,9 @@ import cv2
 from threadpoolctl import threadpool_limits
 
 from network.zenoh import ZenohTransport
-from nodes.process import Pace, Shell, run_camera, run_central
+from nodes.process import Shell, run_camera, run_central
 from sim.assembly import Assembly
+from sim.faults.process import FailingProcess
 from sim.scenario.parsing import ScenarioError
 
 
@@ -31,6 +32,7 @@ def run_node(
         SourceError: The camera's video cannot be read.
     """
     scenario = assembly.scenario
+    assembly.require_real_links()
     if name not in assembly.links:
         raise ScenarioError(f"{scenario.name} has no node {name}: its nodes are {', '.join(assembly.links)}")
     # One thread a process: as many processes as cameras share the cores.
@@ -39,13 +41,13 @@ def run_node(
     links = assembly.links[name]
     late_is_lost = scenario.pace == "realtime"
     transport = ZenohTransport(scenario.name, name, links, listen, connect, drop_late_pixels=late_is_lost)
-    pace = Pace(scenario.pace, scenario.rate_hz, scenario.network.deadline_s)
-    shell = Shell(name, transport, pace, scenario.frames, stopped)
+    shell = Shell(name, transport, assembly.pace, scenario.frames, stopped)
     try:
         if links.cameras:
-            run_central(assembly.central(), shell)
+            run_central(assembly.central(), links, shell)
         else:
-            run_camera(assembly.smart_camera(name), assembly.source(name), links, shell)
+            source = FailingProcess(assembly.source(name), name, scenario.faults)
+            run_camera(assembly.smart_camera(name), source, links, shell)
     finally:
         stopped.set()
         transport.close()

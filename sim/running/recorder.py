@@ -78,7 +78,7 @@ class Recorder:
         self._waiting: dict[int, dict[Track, EstimateMessage]] = {}
         self._latest: dict[Track, int] = {}
         self._next = 0
-        self._skips = scenario.pace == "realtime"
+        self._skips = scenario.pace == "realtime" or bool(scenario.faults)
         try:
             (folder / "logs").mkdir(parents=True, exist_ok=True)
             for earlier in ("summary.json", FILM):
@@ -165,7 +165,7 @@ class Recorder:
     def _is_complete(self, frame: int) -> bool:
         if not self._skips:
             return frame <= self._next and self._expected <= self._waiting[frame].keys()
-        # In real time, a node that has told of a later frame has left this one out.
+        # In real time, or away, a node that has told of a later frame has left this one out.
         return all(self._latest.get(track, -1) >= frame for track in self._expected)
 
     def _write_frames(self, frames: Iterable[int]) -> None:

@@ -11,6 +11,7 @@ from jaxtyping import Float
 from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from sim.metrics.loss import losses
 from sim.metrics.sets import gospa, ospa
+from sim.running.members import disagreements, membership
 from sim.running.metrics import (
     LOST_DIAGONALS,
     LOST_ERROR,
@@ -21,6 +22,7 @@ from sim.running.metrics import (
     position_errors,
     rmse,
 )
+from sim.running.traffic import network_figures
 from sim.scenario.model import Scenario
 
 Track = tuple[str, str]
@@ -59,6 +61,9 @@ class Results:
                 self.tracks.setdefault((message.estimator, message.node), {})[message.frame] = message
             case TruthMessage():
                 self.truth[message.frame] = message
+            case StatusMessage(state="ready"):
+                # a node that was started again counts from 0
+                self.first_statuses.pop(message.node, None)
             case StatusMessage(state="running"):
                 self.first_statuses.setdefault(message.node, message)
             case StatusMessage(state="done" | "failed"):
@@ -117,6 +122,7 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
     scenario = results.scenario
     dcpf, single = results.of("dcpf"), results.of("single")
     cpf = next(iter(results.of("cpf").values()), None)
+    joint = {node: results.tracks[track] for node, track in dcpf.items()}
     errors = {track: results.errors(track) for track in results.tracks}
     per_node = {node: _rmse(errors[track]) for node, track in dcpf.items()}
     all_nodes = [e for track in dcpf.values() if (e := errors[track]) is not None]
@@ -129,6 +135,7 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
             "single": {node: _rmse(errors[track]) for node, track in single.items()},
             "dcpf_per_node": per_node,
         },
+        "disagreement_per_frame": disagreements(joint, scenario.frames, scenario.target.n_axes),
         "disagreement": _number(disagreement(np.array([results.means(t)[1:] for t in dcpf.values()])))
         if dcpf
         else None,
@@ -157,7 +164,8 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
             "dcpf": _tracking(results, list(dcpf.values())),
             "cpf": _tracking(results, [cpf] if cpf else []),
         },
-        "network": _network(results),
+        "network": network_figures(scenario, results.first_statuses, results.statuses),
+        "members": membership(joint, [camera.name for camera in scenario.cameras], scenario.frames),
         "fusion": _fusion(results),
         **_array(results),
         "timing": {**results.timing, **_timing(results)},
@@ -224,38 +232,6 @@ def _tracking(results: Results, tracks: list[Track]) -> dict[str, float | None] 
         "losses_per_node": len(each) / len(known),
         "reacquired_after_s": float(np.mean(found_after)) / results.scenario.rate_hz if found_after else None,
     }
-
-
-def _network(results: Results) -> dict[str, Any]:
-    """Messages and bytes as the transports counted them, to each receiver.
-
-    The figures a frame are means over the frames after frame 0, in which the cameras exchange what the target
-    looks like: its bytes stand apart. Nodes that died on the way have told no total and are left out.
-    """
-    frames = results.scenario.frames - 1
-    last = results.statuses
-    first = {node: status for node, status in results.first_statuses.items() if node in last}
-    sent = _total(last, "messages")["consensus"] - _total(first, "messages")["consensus"]
-    at_start, octets = _total(first, "bytes"), _total(last, "bytes")
-    return {
-        "iterations": results.scenario.network.iterations,
-        "messages_per_frame": round(sent / frames, 3),
-        "bytes_per_frame": {
-            "dcpf": round((octets["consensus"] - at_start["consensus"]) / frames, 1),
-            "cpf": round((octets["pixels"] - at_start["pixels"]) / frames, 1),
-        },
-        "bytes_at_start": {"dcpf": at_start["consensus"], "cpf": at_start["pixels"]},
-        "late": sum(int(_plain(status.counters.get("late"))) for status in last.values()),
-        "refused": int(_total(last, "refused").total()),
-        "unused": dict(_total(last, "unused")),
-    }
-
-
-def _total(statuses: Mapping[str, StatusMessage], group: str) -> Counter[str]:
-    total: Counter[str] = Counter()
-    for status in statuses.values():
-        total.update(counted(status, group))
-    return total
 
 
 def counted(status: StatusMessage, group: str) -> Counter[str]:

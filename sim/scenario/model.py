@@ -6,13 +6,16 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from network.conditions import ConditionsOptions
 from network.graph import Edge, Graph, complete, grid, path, ring, star
 from network.options import Options
 from network.quantization import PayloadOptions
 from network.weights import ConsensusOptions
 from nodes.filtering.fusion import FusionOptions
+from nodes.pace import lag_for
 from nodes.setup import FilterOptions
 from nodes.vision.target import TargetOptions
+from sim.faults.options import FaultOptions, require_possible
 from sim.scenario.cameras import Cameras, Name
 from sim.scenario.graphs import DescribedGraph
 from sim.scenario.presets import PresetName
@@ -53,10 +56,15 @@ class NetworkOptions(Options):
     """The averaging."""
     iterations: int = Field(default=12, ge=0, le=1000)
     """Rounds of consensus in a frame, t."""
+    lag_frames: int | None = Field(default=None, ge=0, le=100)
+    """In real time, how many frames longer than one the rounds of a frame may take: so much later comes its
+    estimate, while the next frames have begun. null: as many as the conditions' delays ask for."""
     payload: PayloadOptions = PayloadOptions()
     """How many bits a number of the rounds has."""
+    conditions: ConditionsOptions = ConditionsOptions()
+    """What the links do to messages."""
     deadline_s: float = Field(default=5.0, gt=0)
-    """In lockstep, the time that a frame waits for a neighbour before it goes on without it, in s."""
+    """In lockstep, the time that a frame waits for messages before it goes on without them, in s."""
     router: str = "tcp/127.0.0.1:7447"
     """Zenoh endpoint at which the run's router serves the outside."""
     endpoints: Mapping[Name, str] = Field(default={})
@@ -122,6 +130,8 @@ class Scenario(Options):
     """The central node."""
     baselines: BaselineOptions = BaselineOptions()
     """What DCPF is compared with."""
+    faults: tuple[FaultOptions, ...] = ()
+    """What goes wrong, each by its `kind`, `frame` and, but for the router, `node`."""
     sensor: SensorOptions = SensorOptions()
     """What `dcpf simulate` puts in the place of pictures."""
 
@@ -187,6 +197,12 @@ class Scenario(Options):
             raise ValueError(f"target.part is {target.part}: {of_what} has no parts, leave it out")
 
     @model_validator(mode="after")
+    def _faults(self) -> "Scenario":
+        names = [camera.name for camera in self.cameras]
+        require_possible(self.faults, names, self.frames, rendered=self.world is not None)
+        return self
+
+    @model_validator(mode="after")
     def _network(self) -> "Scenario":
         if isinstance(self.network.graph, str | tuple):
             self.require_convergence()
@@ -202,6 +218,7 @@ class Scenario(Options):
         graph.require_connected()
         network.consensus.require_convergence(graph.max_degree)
         network.consensus.tuned(graph, network.iterations)
+        network.conditions.require_links(graph.edges, graph.names)
 
     @property
     def graph(self) -> Graph:
@@ -216,6 +233,20 @@ class Scenario(Options):
         if isinstance(graph, tuple):
             return Graph.from_edges(names, graph)
         raise ValueError(f"the {graph.kind} graph of {self.name} is not worked out: load the scenario")
+
+    @property
+    def lag_frames(self) -> int:
+        """How many frames more than one the rounds of a frame may take; none in lockstep, which waits."""
+        if self.pace == "lockstep":
+            return 0
+        asked = self.network.lag_frames
+        return self.needed_lag_frames if asked is None else asked
+
+    @property
+    def needed_lag_frames(self) -> int:
+        """The lag that the conditions' delays ask for in real time."""
+        network = self.network
+        return lag_for(network.iterations, network.conditions.latest_round_s, self.rate_hz)
 
     @property
     def n_processes(self) -> int:

@@ -3,7 +3,7 @@
 A preset fills what the scenario file leaves unsaid; what the file says wins.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from nodes.vision.target import TargetOptions
@@ -56,6 +56,9 @@ ONE_CAMERA_PAPER: Mapping[str, Any] = {
 """Medeiros et al. and Truong & Kim: a Gaussian in the distance, whatever the camera sees, and resampling in
 every frame."""
 
+LOSSY: Mapping[str, Any] = {"network": {"consensus": {"algorithm": "ratio"}}}
+"""What the robust preset averages with where links lose messages."""
+
 SMALLEST_PERSON = 0.8
 """Height in m from which a target on a plane is taken for a person."""
 PERSON_PARTS: Mapping[str, Any] = {
@@ -85,11 +88,22 @@ def preset_defaults(data: Mapping[str, Any]) -> Mapping[str, Any]:
     elif name == "robust" and _is_person(target):
         defaults = _merged(defaults, PERSON_PARTS)
     network = data.get("network")
+    if name != "paper" and isinstance(network, Mapping) and _loses(network.get("conditions")):
+        defaults = _merged(defaults, LOSSY)
     consensus = network.get("consensus") if isinstance(network, Mapping) else None
     if isinstance(consensus, Mapping) and "algorithm" in consensus:
         # Another algorithm has other options: the file's own choice stands by itself.
         defaults = {**defaults, "network": {**defaults.get("network", {}), "consensus": {}}}
     return defaults
+
+
+def _loses(conditions: Any) -> bool:
+    """Whether some link loses messages at random."""
+    if not isinstance(conditions, Mapping):
+        return False
+    links = conditions.get("links")
+    each = [conditions, *(links if isinstance(links, Sequence) else ())]
+    return any(isinstance(link, Mapping) and bool(link.get("loss")) for link in each)
 
 
 def _is_person(target: Any) -> bool:

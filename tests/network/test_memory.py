@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from network import codec, graph
+from network.conditions import NS, ConditionsOptions
 from network.memory import MemoryNetwork
 from network.messages import ConfirmMessage, ConsensusMessage, ControlMessage, PixelsMessage, StatusMessage
 from network.transport import Links, links_of
@@ -83,3 +84,33 @@ def test_what_cannot_be_read_is_counted_and_logged_once(caplog, monkeypatch):
 def test_a_node_has_one_part_towards_another():
     with pytest.raises(ValueError, match="B is linked twice"):
         Links(neighbors=("B",), sinks=("B",))
+
+
+def test_messages_arrive_in_virtual_time_and_what_is_lost_does_not():
+    conditions = ConditionsOptions.model_validate({
+        "links": [
+            {"link": ["A", "B"], "delay_s": 0.2, "duplicates": 1.0},
+            {"link": ["A", "D"], "delay_s": 0.1},
+            {"link": ["C", "D"], "loss": 1.0, "directed": True},
+        ]
+    })  # fmt: skip
+    net = MemoryNetwork("run", links_of(graph.ring(NAMES), sinks=["central"]), conditions)
+    assert net.next_ns is None
+    net.post("A", says("A"), NS)
+    net.post("C", says("C"), 2 * NS)
+    net.post("A", PixelsMessage("A", 0, np.zeros((2, 2, 3), np.uint8)), 3 * NS)
+    found = []
+    while (at := net.next_ns) is not None:
+        receiver, message = net.deliver()
+        found.append((at / NS, message.sender, receiver))
+    assert found == [
+        (1.1, "A", "D"),
+        (1.2, "A", "B"),
+        (1.2, "A", "B"),
+        (2.0, "C", "B"),
+        (3.0, "A", "central"),
+    ]
+    assert net.counters["A"].sent == {"B": 1, "D": 1}
+    assert net.counters["C"].sent == {"B": 1, "D": 1}
+    assert net.counters["B"].received == {"A": 2, "C": 1}
+    assert net.counters["D"].received == {"A": 1}

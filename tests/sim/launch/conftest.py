@@ -32,6 +32,7 @@ class Launched:
         self.router = f"tcp/127.0.0.1:{free_port()}"
         # Sockets need a short path; a folder of their own shows whether any is left.
         self.sockets = Path(tempfile.mkdtemp(prefix="t", dir="/tmp"))
+        self.through = ()  # a command that the run is started by
         self.process = None
         self.others = []
         self.seen = set()
@@ -39,7 +40,7 @@ class Launched:
     def run(self, scenario, *arguments):
         """Starts the run."""
         where = ["--out", self.out, "--set", f"network.router={self.router}"]
-        self.process = self._start([*DCPF, "run", scenario, *where, *arguments])
+        self.process = self._start([*self.through, *DCPF, "run", scenario, *where, *arguments])
 
     def beside(self, *command):
         """Starts another process, whose output is read at its end."""

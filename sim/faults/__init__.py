@@ -1,0 +1,1 @@
+"""Faults of a scenario: what goes wrong at which frame."""

@@ -1,0 +1,35 @@
+"""What a valid scenario may not be meant to say: one sentence each, with the remedy."""
+
+from collections.abc import Iterator
+
+from network.averaging.finite_time import roots_of
+from sim.scenario.model import Scenario
+
+
+def advice(scenario: Scenario) -> Iterator[str]:
+    """What the network's conditions do to its averaging.
+
+    Args:
+        scenario: With a graph of names and edges.
+    """
+    network, lag, needed = scenario.network, scenario.lag_frames, scenario.needed_lag_frames
+    message_s = network.conditions.latest_round_s
+    if network.conditions.lose and network.consensus.algorithm != "ratio":
+        yield (
+            f"network.consensus is {network.consensus.algorithm}, whose average suffers from every message"
+            " that only one end of a link has: on links that lose messages, ratio does not"
+        )
+    if scenario.pace != "realtime" or not message_s:
+        return
+    if lag < needed:
+        yield (
+            f"network.lag_frames is {lag}, and {network.iterations} rounds of {message_s:g} s need {needed}:"
+            " rounds will be cut; leave it out"
+        )
+    elif lag:
+        needs = len(roots_of(scenario.graph))
+        sooner = f": {needs} rounds of finite_time bring them sooner" if needs < network.iterations else ""
+        yield (
+            f"network.iterations is {network.iterations}, which takes {network.iterations * message_s:g} s on"
+            f" these links, so that estimates come {lag} frames after their pictures{sooner}"
+        )
