@@ -11,8 +11,8 @@ from network.options import Options
 from network.quantization import PayloadOptions
 from network.weights import ConsensusOptions
 from nodes.filtering.fusion import FusionOptions
-from nodes.filtering.target import TargetOptions
 from nodes.setup import FilterOptions
+from nodes.vision.target import TargetOptions
 from sim.scenario.cameras import Cameras, Name
 from sim.scenario.graphs import DescribedGraph
 from sim.scenario.presets import PresetName
