@@ -30,7 +30,8 @@ class Block:
     Attributes:
         kind: `sh` or `yaml`.
         marker: Of commands: nothing where they shall end well; `fails` where they shall be refused as wrong;
-            `beside` where they go on in another terminal; `elsewhere` where they need what is not here.
+            `beside` where they go on in another terminal; `elsewhere` where they need what is not
+            here, or another page has them too.
         name: The file that it is, of a block with a caption.
         text: What is in it.
     """
