@@ -9,10 +9,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from network.messages import EstimateMessage
-from nodes.filtering.appearance import Appearance
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.motion import DynamicsOptions
-from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.sighting import Sighting, shrinkage
 from nodes.setup import TrackingSetup
 from nodes.simd.memory import LineMemoryError
@@ -20,6 +18,8 @@ from nodes.simd.programs.binning import BinningOptions
 from nodes.simd.report import FrameReport
 from nodes.simd.tracker import SimdTracker
 from nodes.simd.tracker_options import TrackerOptions
+from nodes.vision.appearance import Appearance
+from nodes.vision.observation import ObservationModel, Picture
 
 
 class ArrayEstimator:

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from typing import Literal
 
 from network.messages import EstimateMessage
-from nodes.filtering.appearance import Appearance
 from nodes.filtering.fusion import propagate
 from nodes.filtering.gaussian import Moments
-from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.sighting import Sighting, shrinkage
 from nodes.filtering.sir import View, sir_step
 from nodes.setup import TrackingSetup
+from nodes.vision.appearance import Appearance
+from nodes.vision.observation import ObservationModel, Picture
 
 
 class SirEstimator:

@@ -14,11 +14,9 @@ from network.consensus import Consensus
 from network.messages import ConsensusMessage, EstimateMessage, PreviewMessage, StateMessage
 from nodes.array_estimator import ArrayEstimator
 from nodes.estimator import SirEstimator
-from nodes.filtering.appearance import Appearance, pack_looks, settled, unpack_looks
 from nodes.filtering.fusion import fuse, is_density, left_of, pack, propagate, unpack
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.local import LocalResult, local_filter
-from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.particles import Particles, effective_sample_size, resample_if_degenerate
 from nodes.filtering.sighting import Sighting
 from nodes.frame import FrameInProgress, is_new
@@ -27,6 +25,8 @@ from nodes.rounds import Rounds
 from nodes.setup import TrackingSetup
 from nodes.simd.report import FrameReport
 from nodes.telemetry import Counters
+from nodes.vision.appearance import Appearance, pack_looks, settled, unpack_looks
+from nodes.vision.observation import ObservationModel, Picture
 
 Outgoing = tuple[ConsensusMessage | EstimateMessage, ...]
 

@@ -20,12 +20,12 @@ from nodes.camera import Camera
 from nodes.central import Central
 from nodes.counting.build import load_kernel
 from nodes.estimator import SirEstimator
-from nodes.filtering.observation import ObservationModel
 from nodes.pace import Pace
 from nodes.setup import Start, TrackingSetup
 from nodes.simd.likelihood import SimdLikelihood
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
+from nodes.vision.observation import ObservationModel
 from sim.faults.pictures import with_faults
 from sim.scenario.loading import cameras_of, video_source
 from sim.scenario.model import Scenario

@@ -17,6 +17,7 @@ OUTSIDE_WORLD = {
 
 PURE = (
     *sorted((ROOT / "nodes/filtering").rglob("*.py")),
+    *sorted((ROOT / "nodes/vision").glob("*.py")),
     *sorted(path for path in (ROOT / "nodes/counting").glob("*.py") if path.name != "build.py"),
     *sorted((ROOT / "sim/metrics").glob("*.py")),
     ROOT / "sim/running/metrics.py",
@@ -43,6 +44,8 @@ PURE = (
         ROOT / "sim" / name
         for name in (
             *("live/nodes.py", "live/setting.py", "live/story.py", "replay/playback.py"),
+            *("report/elements.py", "report/figures.py", "report/run_tables.py", "report/stills.py"),
+            "report/svg.py",
             *("recording/foxglove.py", "recording/scene.py", "recording/schemas.py"),
             *("faults/options.py", "faults/pictures.py", "faults/schedule.py"),
         )

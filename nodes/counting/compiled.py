@@ -63,7 +63,7 @@ class Coding:
         tables: What blue, green and red add to it.
         hue_bins: If above 0, the index is the bin of the hue instead.
         grey: Which pixels have no hue: the chroma and the saturation below which they have none, and full
-            saturation; see `nodes.filtering.hue.hue_bins`.
+            saturation; see `nodes.vision.hue.hue_bins`.
     """
 
     tables: UInt16[np.ndarray, "3 256"]
@@ -146,7 +146,7 @@ def distances_compiled(
     grid: tuple[int, int] | None,
     kernel: str,
 ) -> Float[np.ndarray, " N"]:
-    """Finds d² of each box to the reference, as `nodes.filtering.pattern.squared_distances` defines it.
+    """Finds d² of each box to the reference, as `nodes.vision.pattern.squared_distances` defines it.
 
     Args:
         image: The picture, blue, green, red.

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from nodes.filtering.appearance import Appearance
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.motion import MotionModel, predict
-from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.particles import (
     Particles,
     effective_sample_size,
     resample_if_degenerate,
     reweight,
 )
+from nodes.vision.appearance import Appearance
+from nodes.vision.observation import ObservationModel, Picture
 
 
 @dataclass(frozen=True, slots=True, eq=False)

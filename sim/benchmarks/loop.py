@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
-from nodes.filtering.appearance import Appearance
-from nodes.filtering.color import ColorOptions
-from nodes.filtering.observation import ObservationModel, Picture
+from nodes.vision.appearance import Appearance
+from nodes.vision.color import ColorOptions
+from nodes.vision.observation import ObservationModel, Picture
 
 HUE_RANGE = 180
 """OpenCV's hues of 8 bits are whole 2 degrees."""

@@ -16,10 +16,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from nodes.filtering.motion import predict
-from nodes.filtering.observation import LEAST_BOXES, ObservationModel
 from nodes.filtering.particles import LEAST_OUTPUTS, Particles, resample, reweight
 from nodes.filtering.sir import View, sir_step
 from nodes.threads import in_shares, n_shares
+from nodes.vision.observation import LEAST_BOXES, ObservationModel
 from sim.assembly import Assembly
 from sim.benchmarks.settings import SETTINGS, Setting, setting
 from sim.benchmarks.timing import times_in_turn

@@ -11,14 +11,14 @@ from jaxtyping import Float
 
 from nodes.counting.build import KernelError, load_kernel
 from nodes.counting.histogram import SamplingOptions
-from nodes.filtering.appearance import Appearance
 from nodes.filtering.motion import predict
-from nodes.filtering.observation import ObservationModel, ObservationOptions, Picture
 from nodes.filtering.particles import Particles
 from nodes.filtering.sir import View, sir_step
-from nodes.filtering.target import project_boxes
 from nodes.setup import TrackingSetup
 from nodes.simd.likelihood import SimdLikelihood
+from nodes.vision.appearance import Appearance
+from nodes.vision.observation import ObservationModel, ObservationOptions, Picture
+from nodes.vision.target import project_boxes
 from sim.assembly import Assembly
 from sim.benchmarks.loop import looping_like
 from sim.scenario.loading import load_scenario

@@ -9,9 +9,9 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from nodes.filtering.observation import LEAST_BOXES
 from nodes.setup import FilterOptions
 from nodes.threads import n_shares
+from nodes.vision.observation import LEAST_BOXES
 from sim.scenario.advice import advice
 from sim.scenario.loading import load_scenario
 from sim.scenario.model import Scenario

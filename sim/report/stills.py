@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from network.messages import EstimateMessage, PreviewMessage
 from nodes.camera import Camera
-from nodes.filtering.target import TargetOptions
+from nodes.vision.target import TargetOptions
 from sim.assembly import Assembly
 from sim.pictures.canvas import Image, draw_dots, draw_lines
 from sim.pictures.ground import ellipse
@@ -45,8 +45,8 @@ def choose_moments(results: Results) -> dict[int, str]:
     errors = np.array(
         [e for track in results.of("dcpf").values() if (e := results.errors(track)) is not None]
     )
-    if errors.size and np.isfinite(errors).any():
-        worst = 1 + int(np.nanargmax(np.nanmax(errors, axis=0, initial=-np.inf)))
+    if np.isfinite(errors).any():
+        worst = 1 + int(np.nan_to_num(errors, nan=-1.0).max(axis=0).argmax())
         moments.setdefault(worst, "DCPF is farthest from the truth")
     return dict(sorted(moments.items()))
 

@@ -12,9 +12,9 @@ from network.options import Options
 from network.quantization import PayloadOptions
 from network.weights import ConsensusOptions
 from nodes.filtering.fusion import FusionOptions
-from nodes.filtering.target import TargetOptions
 from nodes.pace import lag_for
 from nodes.setup import FilterOptions
+from nodes.vision.target import TargetOptions
 from sim.faults.options import FaultOptions, require_possible
 from sim.scenario.cameras import Cameras, Name
 from sim.scenario.graphs import DescribedGraph

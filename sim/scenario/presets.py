@@ -6,7 +6,7 @@ A preset fills what the scenario file leaves unsaid; what the file says wins.
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
-from nodes.filtering.target import TargetOptions
+from nodes.vision.target import TargetOptions
 
 PresetName = Literal["paper", "robust"]
 

@@ -30,6 +30,7 @@ sys.argv += {{
     "run": ["--frames", "5", *addresses],
     "node": ["--frames", "5", *addresses],
     "compare": ["--frames", "4", "--runs", "1", "--jobs", "1"],
+    "simulate": ["--frames", "5"],
     "watch": ["--connect", router],
 }}.get(command, [])
 if command in ("watch", "node"):

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from nodes.camera import look_at
 from nodes.counting.histogram import SamplingOptions
 from nodes.filtering import observation
-from nodes.filtering.observation import ObservationModel, ObservationOptions
 from nodes.filtering.particles import Particles, normalize, resample, systematic_indices
-from nodes.filtering.target import TargetOptions
 from nodes.threads import in_shares, n_shares
+from nodes.vision.observation import ObservationModel, ObservationOptions
+from nodes.vision.target import TargetOptions
 
 
 @given(st.integers(0, 50), st.integers(1, 5), st.integers(1, 20))

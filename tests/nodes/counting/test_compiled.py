@@ -10,8 +10,8 @@ from nodes.counting.build import KernelError, load_kernel
 from nodes.counting.codebook import codebook
 from nodes.counting.compiled import compile_reference, counts_compiled, distances_compiled
 from nodes.counting.histogram import SamplingOptions, count
-from nodes.filtering.color import ColorOptions, coding, quantize
-from nodes.filtering.pattern import Pattern, coefficients, squared_distances
+from nodes.vision.color import ColorOptions, coding, quantize
+from nodes.vision.pattern import Pattern, coefficients, squared_distances
 
 HEIGHT, WIDTH = 30, 40
 BOX_COST_OF_NONE, BOX_COST_OF_ALL = 10**9, -(10**9)

@@ -14,10 +14,10 @@ from nodes.filtering.fusion import FusionOptions, fuse, pack, propagate, unpack
 from nodes.filtering.gaussian import Information, Moments, log_factor, moments
 from nodes.filtering.local import local_filter
 from nodes.filtering.motion import DynamicsOptions, autoregression, constant_velocity, predict
-from nodes.filtering.observation import ObservationModel, ObservationOptions, Picture
 from nodes.filtering.particles import resample_if_degenerate, sample_gaussian
 from nodes.filtering.sir import View, sir_step
-from nodes.filtering.target import TargetOptions
+from nodes.vision.observation import ObservationModel, ObservationOptions, Picture
+from nodes.vision.target import TargetOptions
 
 MOTION = constant_velocity(2, 0.1, DynamicsOptions(velocity_variance=0.04))
 AUTOREGRESSION = autoregression(

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 
 from network.options import Options
 from nodes.counting.compiled import Coding
-from nodes.filtering.hue import FULL_SATURATION, GREY_CHROMA, GREY_SATURATION, MAX_BINS, hue_bins
+from nodes.vision.hue import FULL_SATURATION, GREY_CHROMA, GREY_SATURATION, MAX_BINS, hue_bins
 
 GAIN_GRID_PX = 24
 """Every 24th pixel of every 24th line is enough for a median."""

@@ -14,8 +14,8 @@ from jaxtyping import Float, Int
 
 from nodes.counting.codebook import Codebook, codebook
 from nodes.counting.compiled import Compiled, compile_reference
-from nodes.filtering.appearance import Appearance
-from nodes.filtering.color import ColorOptions
+from nodes.vision.appearance import Appearance
+from nodes.vision.color import ColorOptions
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from pydantic import Field
 
 from network.options import Options
-from nodes.filtering.color import ColorOptions
+from nodes.vision.color import ColorOptions
 
 
 class ModelUpdateOptions(Options):
@@ -76,7 +76,7 @@ def distinctness_of(
 def distance_to(
     histograms: Float[np.ndarray, "P C B"], reference: Appearance, options: ColorOptions
 ) -> float:
-    """The distance d² of `nodes.filtering.pattern`, from normalised histograms."""
+    """The distance d² of `nodes.vision.pattern`, from normalised histograms."""
     weights = np.array(options.part_weights)[:, None, None] / options.n_channels
     omega, q = reference.distinctness, reference.histograms
     perfect = (weights * omega * q).sum()

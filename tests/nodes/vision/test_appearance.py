@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodes.filtering.appearance import (
+from nodes.vision.appearance import (
     Appearance,
     ModelUpdateOptions,
     distance_to,
@@ -19,8 +19,8 @@ from nodes.filtering.appearance import (
     unpack_looks,
     update_appearance,
 )
-from nodes.filtering.color import ColorOptions
-from nodes.filtering.pattern import coefficients, pattern_of, squared_distances
+from nodes.vision.color import ColorOptions
+from nodes.vision.pattern import coefficients, pattern_of, squared_distances
 
 JOINT = ColorOptions(space="joint_rgb", bins_per_channel=2)
 RGB = ColorOptions(bins_per_channel=4)

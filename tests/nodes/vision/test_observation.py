@@ -7,14 +7,14 @@ import pytest
 
 from nodes.camera import look_at
 from nodes.counting.histogram import SamplingOptions
-from nodes.filtering.appearance import ModelUpdateOptions
-from nodes.filtering.color import ColorOptions
-from nodes.filtering.observation import (
+from nodes.vision.appearance import ModelUpdateOptions
+from nodes.vision.color import ColorOptions
+from nodes.vision.observation import (
     ObservationModel,
     ObservationOptions,
     surrounding_boxes,
 )
-from nodes.filtering.target import TargetOptions, project_boxes
+from nodes.vision.target import TargetOptions, project_boxes
 
 TARGET = TargetOptions(height=1.7, width=0.5)
 CAMERA = look_at("C1", np.array([0.0, -6.0, 2.5]), np.array([0.0, 0.0, 1.0]), 110.0, (160, 120), np.zeros(5))

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from nodes.camera import look_at
-from nodes.filtering.target import TargetOptions, project_boxes, visible_fraction
+from nodes.vision.target import TargetOptions, project_boxes, visible_fraction
 
 UP = np.array([0.0, 0.0, 1.0])
 WIDTH, HEIGHT = 160, 120

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodes.filtering.likelihood import LikelihoodOptions, background_constants, log_likelihoods
+from nodes.vision.likelihood import LikelihoodOptions, background_constants, log_likelihoods
 
 D0, VARIANCE = 0.12, 0.01
 FLOOR = -D0 / (2 * VARIANCE)

@@ -16,14 +16,17 @@ from nodes.camera import Camera
 from nodes.counting.codebook import Codebook
 from nodes.counting.compiled import distances_compiled
 from nodes.counting.histogram import SamplingOptions, locate
-from nodes.filtering.appearance import (
+from nodes.simd.likelihood import SimdLikelihood
+from nodes.simd.options import SimdOptions
+from nodes.threads import in_shares
+from nodes.vision.appearance import (
     Appearance,
     ModelUpdateOptions,
     distinctness_of,
     normalize_counts,
     update_appearance,
 )
-from nodes.filtering.color import (
+from nodes.vision.color import (
     ColorOptions,
     GainReference,
     channel_gain,
@@ -32,12 +35,9 @@ from nodes.filtering.color import (
     quantize,
     without_gain,
 )
-from nodes.filtering.likelihood import LikelihoodOptions, background_constants, log_likelihoods
-from nodes.filtering.pattern import Pattern, coefficients, full_codebook, pattern_of, squared_distances
-from nodes.filtering.target import TargetOptions, project_boxes, visible_fraction
-from nodes.simd.likelihood import SimdLikelihood
-from nodes.simd.options import SimdOptions
-from nodes.threads import in_shares
+from nodes.vision.likelihood import LikelihoodOptions, background_constants, log_likelihoods
+from nodes.vision.pattern import Pattern, coefficients, full_codebook, pattern_of, squared_distances
+from nodes.vision.target import TargetOptions, project_boxes, visible_fraction
 
 GOOD_SIGHT = 0.9
 """Part of the target's box inside the picture from which a camera trusts its own eyes for a reference."""

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from nodes.filtering.color import ColorOptions, channel_gain, gain_reference, quantize
-from nodes.filtering.hue import hue_bins
+from nodes.vision.color import ColorOptions, channel_gain, gain_reference, quantize
+from nodes.vision.hue import hue_bins
 
 NO_GAIN = np.ones(3)
 seeds = st.integers(0, 2**32 - 1)
