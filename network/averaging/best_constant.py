@@ -18,6 +18,6 @@ class BestConstant(AlgorithmOptions):
     algorithm: Literal["best_constant"] = "best_constant"
     """The constant weight that is best for this graph, 2 / (λ₂ + λ_N) of its Laplacian."""
 
-    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:  # noqa: ARG002 - good for any number of rounds
+    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:
         """Constant weights of that size."""
         return ConstantWeights(epsilon=extremes_of(graph).step)

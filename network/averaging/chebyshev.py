@@ -31,7 +31,7 @@ class Chebyshev(AlgorithmOptions):
     algorithm: Literal["chebyshev"] = "chebyshev"
     """Accelerated by the momentum that is best for this graph's λ₂ and λ_N."""
 
-    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:  # noqa: ARG002 - good for any number of rounds
+    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:
         """Chebyshev acceleration on this graph."""
         return TunedChebyshev(extremes_of(graph))
 
@@ -60,11 +60,11 @@ class TunedChebyshev:
     spectrum: Spectrum
     uses_late: ClassVar[bool] = False
 
-    def begin(self, value: Vector, last: Flowing | None) -> Flowing:  # noqa: ARG002 - nothing is kept
+    def begin(self, value: Vector, last: Flowing | None) -> Flowing:
         """The node's own value, at rest."""
         return Flowing(value, 0.0, {})
 
-    def payload(self, state: Flowing, degree: int) -> Vector:  # noqa: ARG002 - the same for everybody
+    def payload(self, state: Flowing, degree: int) -> Vector:
         """The value."""
         return state.value
 

@@ -25,12 +25,12 @@ class CovarianceIntersection:
         """One Gaussian of the state, and the weight."""
         return triangle(n_states) + n_states + 1
 
-    def pack(self, local: LocalEstimate, n_cameras: int) -> Float[np.ndarray, "*C K"]:  # noqa: ARG002 - as all
+    def pack(self, local: LocalEstimate, n_cameras: int) -> Float[np.ndarray, "*C K"]:
         """ω p⁻¹, ω p⁻¹u and ω = 1 / tr(p) of the position."""
         weight = 1 / np.trace(local.posterior.position().covariance, axis1=-2, axis2=-1)
         weight = np.asarray(weight)[..., None]
         return joined(weight * pack_symmetric(local.after.matrix), weight * local.after.vector, weight)
 
-    def unpack(self, average: Float[np.ndarray, "*C K"], n_cameras: int, n_states: int) -> Moments:  # noqa: ARG002
+    def unpack(self, average: Float[np.ndarray, "*C K"], n_cameras: int, n_states: int) -> Moments:
         """The sums over the sum of the weights."""
         return to_moments(split_information(average[..., :-1] / average[..., -1:], n_states))

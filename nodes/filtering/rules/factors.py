@@ -24,7 +24,7 @@ class Eq17:
         """Two Gaussians of the state."""
         return 2 * (triangle(n_states) + n_states)
 
-    def pack(self, local: LocalEstimate, n_cameras: int) -> Float[np.ndarray, "*C K"]:  # noqa: ARG002 - as all
+    def pack(self, local: LocalEstimate, n_cameras: int) -> Float[np.ndarray, "*C K"]:
         """X_c1, x_c2, X_c3, x_c4: p⁻¹, p⁻¹u, r⁻¹, r⁻¹v."""
         after, before = local.after, local.before
         return joined(
@@ -52,7 +52,7 @@ class MeasuredSum:
         """One Gaussian of the position: five numbers on a plane."""
         return triangle(n_states // 2) + n_states // 2
 
-    def pack(self, local: LocalEstimate, n_cameras: int) -> Float[np.ndarray, "*C K"]:  # noqa: ARG002 - as all
+    def pack(self, local: LocalEstimate, n_cameras: int) -> Float[np.ndarray, "*C K"]:
         """Λ and η of the position."""
         information = local.measured if self.of == "moments" else local.fitted
         return joined(pack_symmetric(information.matrix), information.vector)

@@ -31,7 +31,7 @@ class Hybrid:
         n_axes = n_states // 2
         return triangle(n_states) + n_states + triangle(n_axes) + n_axes
 
-    def pack(self, local: LocalEstimate, n_cameras: int) -> Float[np.ndarray, "*C K"]:  # noqa: ARG002 - as all
+    def pack(self, local: LocalEstimate, n_cameras: int) -> Float[np.ndarray, "*C K"]:
         """r⁻¹ and r⁻¹v, Λ and η."""
         before, measured = local.before, local.measured
         return joined(

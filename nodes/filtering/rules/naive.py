@@ -22,11 +22,11 @@ class NaiveAverage:
         """A covariance and a mean."""
         return triangle(n_states) + n_states
 
-    def pack(self, local: LocalEstimate, n_cameras: int) -> Float[np.ndarray, "*C K"]:  # noqa: ARG002 - as all
+    def pack(self, local: LocalEstimate, n_cameras: int) -> Float[np.ndarray, "*C K"]:
         """The camera's p and u."""
         return joined(pack_symmetric(local.posterior.covariance), local.posterior.mean)
 
-    def unpack(self, average: Float[np.ndarray, "*C K"], n_cameras: int, n_states: int) -> Moments:  # noqa: ARG002
+    def unpack(self, average: Float[np.ndarray, "*C K"], n_cameras: int, n_states: int) -> Moments:
         """The means of both."""
         # the packed form is the same, of p and u in place of p⁻¹ and p⁻¹u
         mean = split_information(average, n_states)
