@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check install clean
+.PHONY: demo test check docs install clean
 
 demo: $(VENV)/installed  ## scene 1 with four camera processes and the central one, and how they compare
 	$(BIN)/dcpf run scenarios/scene1.yaml
@@ -16,6 +16,10 @@ check: $(VENV)/installed-dev  ## style and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+docs: $(VENV)/installed-dev  ## these pages as a site that needs no network, in build/site; broken links are errors
+	$(BIN)/python -m sphinx --fresh-env --write-all --fail-on-warning --keep-going --quiet docs build/site
+	@echo build/site/index.html
 
 install: $(VENV)/installed  ## the environment in .venv, with the dcpf command
 

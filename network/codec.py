@@ -244,13 +244,14 @@ def decode_preview(data: bytes) -> PreviewMessage:
     return replace(message, jpeg=picture)
 
 
-def pack_symmetric(matrix: Float[np.ndarray, "D D"]) -> Float[np.ndarray, " K"]:
-    """The upper triangle of a symmetric matrix, row by row; K = D (D + 1) / 2."""
-    return matrix[np.triu_indices(len(matrix))]
+def pack_symmetric(matrix: Float[np.ndarray, "*C D D"]) -> Float[np.ndarray, "*C K"]:
+    """The upper triangle of a symmetric matrix, or of each of many, row by row; K = D (D + 1) / 2."""
+    rows, columns = np.triu_indices(matrix.shape[-1])
+    return matrix[..., rows, columns]
 
 
-def unpack_symmetric(triangle: Float[np.ndarray, " K"], size: int) -> Float[np.ndarray, "D D"]:
-    """The symmetric matrix of an upper triangle.
+def unpack_symmetric(triangle: Float[np.ndarray, "*C K"], size: int) -> Float[np.ndarray, "*C D D"]:
+    """The symmetric matrix of an upper triangle, or those of many.
 
     Args:
         triangle: What ``pack_symmetric`` gives.
@@ -259,9 +260,10 @@ def unpack_symmetric(triangle: Float[np.ndarray, " K"], size: int) -> Float[np.n
     Raises:
         ValueError: The triangle does not have size (size + 1) / 2 numbers.
     """
-    if len(triangle) != size * (size + 1) // 2:
-        raise ValueError(f"{len(triangle)} numbers are not the upper triangle of a {size} x {size} matrix")
-    return triangle[_places(size)]
+    found = triangle.shape[-1]
+    if found != size * (size + 1) // 2:
+        raise ValueError(f"{found} numbers are not the upper triangle of a {size} x {size} matrix")
+    return triangle[..., _places(size)]
 
 
 @lru_cache

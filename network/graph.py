@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 Edge = tuple[str, str]
+_TOLD = 12  # names in an error message
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +104,7 @@ class Graph:
         """
         parts = self.components()
         if len(parts) > 1:
-            listed = " | ".join(", ".join(part) for part in parts)
+            listed = _shortened(" | ", [_shortened(", ", part) for part in parts])
             raise ValueError(f"the graph falls into {len(parts)} parts, {listed}: add edges that join them")
 
     def laplacian(self) -> Float[np.ndarray, "C C"]:
@@ -146,6 +147,12 @@ def grid(names: Sequence[str]) -> Graph:
         pair for start in range(0, len(names), columns) for pair in pairwise(names[start : start + columns])
     ]
     return Graph.from_edges(names, [*beside, *zip(names, names[columns:], strict=False)])
+
+
+def _shortened(between: str, names: Sequence[str]) -> str:
+    """Names in a row; of many, the first ones and how many there are more."""
+    first, rest = names[:_TOLD], len(names) - _TOLD
+    return between.join([*first, f"{rest} more"] if rest > 0 else first)
 
 
 def _pair(a: str, b: str) -> Edge:

@@ -166,7 +166,7 @@ class StateMessage:
     frame: Frame
     mean: Vector
     covariance: Matrix
-    looks: Vector
+    looks: Annotated[Float[np.ndarray, " K"], _json_array(list[float]), _AsLists]
 
     def __post_init__(self) -> None:
         _require_covariance(self.mean, self.covariance)

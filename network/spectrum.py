@@ -10,6 +10,8 @@ import numpy as np
 
 from network.graph import Graph
 
+LARGEST_DENSE = 1500
+"""Nodes up to which all eigenvalues are worked out, in some seconds."""
 _SAME = 1e-9  # of the largest eigenvalue: closer ones are one, split by rounding
 
 
@@ -39,13 +41,44 @@ class Spectrum:
         return (largest - smallest) / (largest + smallest)
 
 
-def spectrum_of(graph: Graph) -> Spectrum:
-    """The spectrum of a connected graph, by O(N³) steps for N nodes.
+def extremes_of(graph: Graph) -> Spectrum:
+    """The smallest non-zero and the largest eigenvalue, all that a step and its contraction follow from.
+
+    Of many nodes by Lanczos iterations on the sparse matrix, which takes about O(N) steps.
 
     Raises:
         ValueError: The graph is not connected.
     """
+    if len(graph.names) <= LARGEST_DENSE:
+        return spectrum_of(graph)
     graph.require_connected()
+    # SciPy takes its time to import, and node processes do without.
+    from scipy.sparse.linalg import eigsh  # noqa: PLC0415
+
+    from network.averaging.matrices import laplacian  # noqa: PLC0415
+
+    L = laplacian(graph)
+    start = np.cos(np.arange(len(graph.names)))  # any fixed one, so that the numbers repeat
+    (largest,) = eigsh(L, k=1, which="LA", v0=start, return_eigenvectors=False)
+    # λ₂ lies next to the 0 of the constant vector: both are the nearest to a point just below
+    _, smallest = np.sort(
+        eigsh(L.tocsc(), k=2, sigma=-1e-3 * largest / len(graph.names), v0=start, return_eigenvectors=False)
+    )
+    return Spectrum((float(smallest), float(largest)))
+
+
+def spectrum_of(graph: Graph) -> Spectrum:
+    """The whole spectrum of a connected graph, by O(N³) steps for N nodes.
+
+    Raises:
+        ValueError: The graph is not connected, or too large.
+    """
+    graph.require_connected()
+    if len(graph.names) > LARGEST_DENSE:
+        raise ValueError(
+            f"all eigenvalues of {len(graph.names)} nodes, more than {LARGEST_DENSE}, take too long:"
+            " choose an algorithm that needs two of them, such as chebyshev"
+        )
     values = np.linalg.eigvalsh(graph.laplacian())[1:]
     if not values.size:
         return Spectrum(())

@@ -17,6 +17,7 @@ import zenoh
 from zenoh import CongestionControl, Locality, Priority
 
 from network import codec, keys, sessions
+from network.answers import Answers
 from network.errors import RefusedMessage
 from network.messages import (
     ConfirmMessage,
@@ -86,8 +87,6 @@ class ZenohTransport:
         self._alive: set[str] = set()
         self._alive_changed = threading.Condition()
         self._orders: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-        self._latest: dict[str, bytes] = {}
-        self._state: StateMessage | None = None
         self._wait: tuple[str, float] | None = None
         self._closed = threading.Event()
         self._session = sessions.open_peer(listen, connect)
@@ -143,10 +142,8 @@ class ZenohTransport:
             self.counters.count(message.kind, len(data), 1)
         publisher = self._publishers[type(message)]
         # those who ask want the joint estimate, not that of one camera on its own
-        if isinstance(message, StatusMessage) or (
-            isinstance(message, EstimateMessage) and message.estimator != "single"
-        ):
-            self._latest[str(publisher.key_expr)] = data
+        if isinstance(message, StatusMessage) or getattr(message, "estimator", "single") != "single":
+            self._answers.keep(str(publisher.key_expr), data)
         publisher.put(data)
 
     def receive(self, sender: str, timeout_s: float) -> PeerMessage | None:
@@ -176,21 +173,11 @@ class ZenohTransport:
 
     def offer(self, state: StateMessage) -> None:
         """Keeps what this node knows, for neighbours that ask."""
-        self._state = state
+        self._answers.offer(state)
 
     def ask(self, name: str, timeout_s: float) -> StateMessage | None:
         """What another node knows, None where it does not answer in time or has nothing to tell."""
-        for reply in self._session.get(keys.state(self._run, name), timeout=timeout_s):
-            if reply.ok is None:
-                continue
-            try:
-                state = codec.decode_public(StateMessage, reply.ok.payload.to_bytes())
-            except RefusedMessage as refusal:
-                self.counters.refuse(name, refusal.reason)
-                continue
-            if state.node == name:
-                return state
-        return None
+        return self._answers.ask(name, timeout_s)
 
     def close(self) -> None:
         """Leaves the network, within seconds whatever the others do."""
@@ -202,27 +189,11 @@ class ZenohTransport:
         return self._session.declare_subscriber(self._inbox_keys[sender], zenoh.handlers.RingChannel(depth))
 
     def _declare_orders(self) -> None:
-        """Hears orders to the run, and answers those who ask for the latest status and estimate."""
         self._session.declare_subscriber(keys.control(self._run), zenoh.handlers.Callback(self._on_order))
-        for key in (keys.status(self._run, self._name), keys.estimate(self._run, self._name)):
-            self._session.declare_queryable(key, zenoh.handlers.Callback(partial(self._answer, key)))
-        state_key = keys.state(self._run, self._name)
-        self._session.declare_queryable(state_key, zenoh.handlers.Callback(self._answer_state))
+        self._answers = Answers(self._session, self._run, self._name, self.counters)
 
     def _on_order(self, sample: zenoh.Sample) -> None:
         self._orders.put(sample.payload.to_bytes())
-
-    def _answer(self, key: str, query: zenoh.Query) -> None:
-        # Under the node's own key: the question may be a wildcard.
-        with query:
-            if key in self._latest:
-                query.reply(key, self._latest[key])
-
-    def _answer_state(self, query: zenoh.Query) -> None:
-        # Put into bytes here, since hardly anybody ever asks.
-        with query:
-            if self._state is not None:
-                query.reply(keys.state(self._run, self._name), codec.encode_public(self._state))
 
     def _declare_publishers(self, *, drop_late_pixels: bool) -> dict[type, zenoh.Publisher]:
         run, name = self._run, self._name

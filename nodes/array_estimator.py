@@ -9,17 +9,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from network.messages import EstimateMessage
-from nodes.filtering.appearance import Appearance
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.motion import DynamicsOptions
-from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.sighting import Sighting, shrinkage
-from nodes.setup import FilterOptions, TrackingSetup
+from nodes.setup import TrackingSetup
 from nodes.simd.memory import LineMemoryError
 from nodes.simd.programs.binning import BinningOptions
 from nodes.simd.report import FrameReport
 from nodes.simd.tracker import SimdTracker
 from nodes.simd.tracker_options import TrackerOptions
+from nodes.vision.appearance import Appearance
+from nodes.vision.observation import ObservationModel, Picture
 
 
 class ArrayEstimator:
@@ -36,10 +36,7 @@ class ArrayEstimator:
             ValueError: The array cannot do what the options ask for; the text says which and what to do.
         """
         self._node, self._setup = node, setup
-        try:
-            self._tracker = SimdTracker(_tracker_options(setup), setup.stream(node, "array"))
-        except LineMemoryError as error:
-            raise ValueError(f"filter.simd.words is {setup.filter.simd.words}: {error}") from error
+        self._tracker = self._new_tracker(setup.filter.likelihood.sigma)
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
         self._before = setup.start.moments
@@ -60,6 +57,9 @@ class ArrayEstimator:
             ValueError: The picture is wider than the array.
         """
         self._appearance = appearance
+        if appearance is not None:
+            # σ as the camera has set it, by what surrounds the target if so asked
+            self._tracker = self._new_tracker(float(np.sqrt(appearance.variance)))
         self._tracker.begin(picture.image, self._before.mean[:2])
         n = float(self._setup.filter.n_particles)
         return self._message(0, self._before, n, visible=True)
@@ -93,6 +93,13 @@ class ArrayEstimator:
         )
         return self._message(frame, state, self._tracker.ess(), visible=visible)
 
+    def _new_tracker(self, sigma: float) -> SimdTracker:
+        setup = self._setup
+        try:
+            return SimdTracker(_tracker_options(setup, sigma), setup.stream(self._node, "array"))
+        except LineMemoryError as error:
+            raise ValueError(f"filter.simd.words is {setup.filter.simd.words}: {error}") from error
+
     def _message(self, frame: int, estimate: Moments, ess: float, *, visible: bool) -> EstimateMessage:
         return EstimateMessage(
             run=self._setup.run,
@@ -110,7 +117,7 @@ class ArrayEstimator:
         )
 
 
-def _tracker_options(setup: TrackingSetup) -> TrackerOptions:
+def _tracker_options(setup: TrackingSetup, sigma: float) -> TrackerOptions:
     """The tracker's options from those of the run.
 
     Raises:
@@ -132,7 +139,7 @@ def _tracker_options(setup: TrackingSetup) -> TrackerOptions:
         region_px=(int(size_px[0]), int(size_px[1])),
         process=_process(chosen.dynamics),
         noise_px=float(np.sqrt(chosen.dynamics.position_variance)),
-        sigma=_sigma(chosen),
+        sigma=sigma,
     )
 
 
@@ -143,11 +150,3 @@ def _process(dynamics: DynamicsOptions) -> tuple[float, float]:
             " filter.dynamics.model, A and B"
         )
     return dynamics.A, dynamics.B
-
-
-def _sigma(chosen: FilterOptions) -> float:
-    if chosen.likelihood.calibration != "fixed":
-        raise ValueError(
-            "filter.likelihood.calibration must be fixed on the array: set it, and filter.likelihood.sigma"
-        )
-    return chosen.likelihood.sigma

@@ -66,25 +66,27 @@ class Camera:
             Pixel coordinates, NaN for points that no lens of this kind can picture (behind the camera, or
             beyond the radius where the distortion folds), and depths along the optical axis in metres.
         """
-        x, y, depth = self.R @ points.T + self.t[:, None]
-        in_front = depth > 1e-6
-        safe = np.maximum(depth, 1e-6)
-        x, y = x / safe, y / safe
+        seen = self.R @ points.T
+        seen += self.t[:, None]
+        depth = seen[2]
+        x, y = rays = seen[:2] / np.maximum(depth, 1e-6)
         r2 = x * x + y * y
-        pictured = in_front & (r2 < self._radius2_limit)
+        pictured = (depth > 1e-6) & (r2 < self._radius2_limit)
         if self._distorts:
             k1, k2, p1, p2, k3 = self.distortion
             radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-            x, y = (
-                x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
-                y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+            x, y = rays = np.stack(
+                (
+                    x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+                    y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+                )
             )
-        u = self.K[0, 0] * x + self.K[0, 1] * y + self.K[0, 2]
-        v = self.K[1, 1] * y + self.K[1, 2]
-        pixels = np.empty((len(points), 2))
-        pixels[:, 0], pixels[:, 1] = u, v
-        pixels[~pictured] = np.nan
-        return pixels, depth
+        # u = f_x x + s y + c_x, v = f_y y + c_y
+        pixels = rays * self.K.diagonal()[:2, None]
+        pixels[0] += self.K[0, 1] * y
+        pixels += self.K[:2, 2:]
+        np.copyto(pixels, np.nan, where=~pictured)
+        return pixels.T, depth
 
     def contains(self, pixels: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, " N"]:
         """Which pixel coordinates lie inside the picture."""

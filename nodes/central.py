@@ -10,9 +10,9 @@ from jaxtyping import UInt8
 
 from network.messages import ConfirmMessage, EstimateMessage, PixelsMessage
 from nodes.estimator import SirEstimator
-from nodes.filtering.appearance import Appearance, pack_looks, settled, unpack_looks
-from nodes.filtering.observation import ObservationModel
 from nodes.setup import TrackingSetup
+from nodes.vision.appearance import Appearance, pack_looks, settled, unpack_looks
+from nodes.vision.observation import ObservationModel
 
 Outgoing = tuple[ConfirmMessage | EstimateMessage, ...]
 

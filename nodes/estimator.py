@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from typing import Literal
 
 from network.messages import EstimateMessage
-from nodes.filtering.appearance import Appearance
 from nodes.filtering.fusion import propagate
 from nodes.filtering.gaussian import Moments
-from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.sighting import Sighting, shrinkage
 from nodes.filtering.sir import View, sir_step
 from nodes.setup import TrackingSetup
+from nodes.vision.appearance import Appearance
+from nodes.vision.observation import ObservationModel, Picture
 
 
 class SirEstimator:
@@ -52,9 +52,14 @@ class SirEstimator:
             self._particles = propagate(self._particles, setup.motion, self._rng)
         self._last_frame = frame
         # predict, reweight by all pictures, estimate, resample
-        threshold = setup.filter.resampling.threshold
+        options = setup.filter
         self._particles, info = sir_step(
-            self._particles, list(views.values()), setup.motion, threshold, self._rng
+            self._particles,
+            list(views.values()),
+            setup.motion,
+            options.resampling.threshold,
+            self._rng,
+            options.threads,
         )
         self._sighting = self._sighting.after(shrinkage(info.predicted.position(), info.estimate.position()))
         # update the references (Eq. 4)

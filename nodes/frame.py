@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import UInt8
 
-from nodes.filtering.observation import Picture
 from nodes.filtering.particles import Particles
+from nodes.vision.observation import Picture
 
 
 @dataclass(frozen=True, slots=True, eq=False)

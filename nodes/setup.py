@@ -11,9 +11,9 @@ from network.streams import stream
 from nodes.filtering.fusion import FusionOptions
 from nodes.filtering.gaussian import Moments
 from nodes.filtering.motion import DynamicsOptions, MotionModel, motion_model
-from nodes.filtering.observation import ObservationOptions
 from nodes.filtering.particles import Particles, sample_gaussian, sample_moments
-from nodes.filtering.target import TargetOptions
+from nodes.vision.observation import ObservationOptions
+from nodes.vision.target import TargetOptions
 
 
 class ResamplingOptions(Options):

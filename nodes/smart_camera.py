@@ -14,19 +14,19 @@ from network.consensus import Consensus
 from network.messages import ConsensusMessage, EstimateMessage, PreviewMessage, StateMessage
 from nodes.array_estimator import ArrayEstimator
 from nodes.estimator import SirEstimator
-from nodes.filtering.appearance import Appearance, pack_looks, settled, unpack_looks
-from nodes.filtering.fusion import fuse, is_density, pack, propagate, unpack
+from nodes.filtering.fusion import fuse, is_density, left_of, pack, propagate, unpack
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.local import LocalResult, local_filter
-from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.particles import Particles, effective_sample_size, resample_if_degenerate
-from nodes.filtering.sighting import Sighting, shrinkage_by
+from nodes.filtering.sighting import Sighting
 from nodes.frame import FrameInProgress, is_new
 from nodes.preview import preview
 from nodes.rounds import Rounds
 from nodes.setup import TrackingSetup
 from nodes.simd.report import FrameReport
 from nodes.telemetry import Counters
+from nodes.vision.appearance import Appearance, pack_looks, settled, unpack_looks
+from nodes.vision.observation import ObservationModel, Picture
 
 Outgoing = tuple[ConsensusMessage | EstimateMessage, ...]
 
@@ -50,8 +50,7 @@ class SmartCamera:
         Args:
             model: The camera's observation model.
             setup: What the run tracks.
-            lanes: Its part of the averaging, which knows who takes part: one, or so many that as many frames'
-                rounds may overlap.
+            lanes: Its part of the averaging, one for each of the frames whose rounds may overlap.
             single: The camera's own filter beside, as a baseline.
         """
         self.name = model.camera.name
@@ -88,13 +87,13 @@ class SmartCamera:
         # predict: χ(k) ~ P(χ(k) | χ(k-1))
         previous, predicted = self._predict(index)
         # reweight by the own picture: u, p, v, r
-        fresh = is_new(image, self._image)
-        self._image = image
+        fresh, self._image = is_new(image, self._image), image
         local = self._filter_locally(picture, predicted, self._appearance if fresh else None)
         self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
         self._frames[index] = FrameInProgress(index, picture, self._done_frame, previous, predicted, fresh)
-        return self._with_result(self._rounds.begin(index, pack(local, self._setup.fusion)))
+        packed = pack(local, len(self._rounds.of(index).members), self._setup.fusion)
+        return self._with_result(self._rounds.begin(index, packed))
 
     def on_message(self, message: ConsensusMessage) -> Outgoing:
         """A neighbour's value of a round has come; one that was gone is counted on again."""
@@ -149,7 +148,7 @@ class SmartCamera:
         }
 
     def waiting_for(self, frame: int) -> tuple[str, ...]:
-        """Neighbours without whose message a frame cannot go on; none when it is done."""
+        """Neighbours that a frame waits for; none when it is done."""
         return self._rounds.of(frame).waiting_for() if frame in self._frames else ()
 
     @property
@@ -171,11 +170,10 @@ class SmartCamera:
 
     @property
     def counters(self) -> Counters:
-        """What it has counted.
+        """What it has counted, by name.
 
-        Frames in which the local (`indefinite_local`) or the fused (`indefinite_fused`) difference of
-        information matrices was not positive semidefinite, so that Eq. 17 had no density; messages of the
-        rounds that were of no use, by reason (`unused`); what a frame costs on the emulated array (`simd`).
+        Frames in which the local or fused difference of information matrices was no density's (Eq. 17);
+        messages of no use, by reason (`unused`); what a frame costs on the emulated array (`simd`).
         """
         report = self._array_report
         return {
@@ -217,8 +215,10 @@ class SmartCamera:
         log_likelihoods = self._model.log_likelihoods(picture, predicted.positions, appearance)
         result = local_filter(predicted, log_likelihoods)
         if own:
-            threshold = self._setup.filter.resampling.threshold
-            self._local_particles = resample_if_degenerate(result.particles, threshold, self._local_rng)
+            options = self._setup.filter
+            self._local_particles = resample_if_degenerate(
+                result.particles, options.resampling.threshold, self._local_rng, options.threads
+            )
         return result
 
     def _finish(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
@@ -238,10 +238,10 @@ class SmartCamera:
         self._estimate = estimate
         ess = effective_sample_size(posterior)
         prior = moments(predicted.states, predicted.weights)
-        self._sighting = self._sighting.after(shrinkage_by(fused.gain, prior))
+        self._sighting = self._sighting.after(left_of(prior, fused))
         # resample
-        threshold = setup.filter.resampling.threshold
-        self._particles = resample_if_degenerate(posterior, threshold, self._fusion_rng)
+        threshold, n_threads = setup.filter.resampling.threshold, setup.filter.threads
+        self._particles = resample_if_degenerate(posterior, threshold, self._fusion_rng, n_threads)
         # update the reference (Eq. 4)
         visible = frame.fresh and self._update_appearance(frame.picture, estimate.position().mean)
         message = self._message(frame, estimate, ess, visible=visible)
@@ -260,7 +260,7 @@ class SmartCamera:
 
     def _begin(self, image: UInt8[np.ndarray, "H W 3"]) -> Outgoing:
         """Frame 0: the target's looks, averaged over the cameras that see it at the start."""
-        self._model = self._model.with_first(image)
+        self._model, self._image = self._model.with_first(image), image
         picture = self._model.look(image)
         position = self._setup.start.moments.position().mean
         self._appearance = self._model.first_appearance(picture, position)

@@ -18,13 +18,14 @@ from network.transport import Links, links_of
 from nodes.array_estimator import ArrayEstimator
 from nodes.camera import Camera
 from nodes.central import Central
+from nodes.counting.build import load_kernel
 from nodes.estimator import SirEstimator
-from nodes.filtering.observation import ObservationModel
 from nodes.pace import Pace
 from nodes.setup import Start, TrackingSetup
 from nodes.simd.likelihood import SimdLikelihood
 from nodes.smart_camera import SmartCamera
 from nodes.sources import FrameSource
+from nodes.vision.observation import ObservationModel
 from sim.faults.pictures import with_faults
 from sim.scenario.loading import cameras_of, video_source
 from sim.scenario.model import Scenario
@@ -107,6 +108,20 @@ class Assembly:
         _ = self.cameras, self.links, self.algorithm, self.setup
         if self.world is not None:
             _ = self.world.interior
+        self.require_backend()
+
+    def require_backend(self) -> None:
+        """Makes sure that the cameras can have what the filter is to run on, before anything starts.
+
+        Raises:
+            KernelError: The compiled kernel cannot be had.
+            ScenarioError: The emulated array cannot do what the options ask for.
+        """
+        if self.scenario.filter.backend == "compiled":
+            load_kernel()
+        elif self.scenario.filter.backend == "simd":
+            first = self.scenario.cameras[0].name
+            _ = self.model_on_camera(first), self.single(first)
 
     @cached_property
     def world(self) -> World | None:
@@ -193,7 +208,7 @@ class Assembly:
         try:
             return replace(model, processor=SimdLikelihood(options.simd, options.color, options.sampling))
         except ValueError as error:
-            raise ScenarioError(f"{self.scenario.name}: filter.backend is simd, and {error}") from error
+            raise ScenarioError(f"{self.scenario.name}: filter.backend is simd, but {error}") from error
 
     def single(self, camera: str) -> SirEstimator | ArrayEstimator | None:
         """A camera's filter on its own, if it is asked for; in the image plane wholly on its processor.
@@ -208,7 +223,7 @@ class Assembly:
         try:
             return ArrayEstimator(camera, self.setup)
         except ValueError as error:
-            raise ScenarioError(f"{self.scenario.name}: filter.backend is simd, and {error}") from error
+            raise ScenarioError(f"{self.scenario.name}: filter.backend is simd, but {error}") from error
 
     def smart_camera(self, name: str) -> SmartCamera:
         """A camera's node."""

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from nodes.camera import Camera
 from nodes.filtering.motion import DynamicsOptions
-from nodes.filtering.target import TargetOptions
+from nodes.vision.target import TargetOptions
 from sim.footage.ground_truth import read_ground_truth
 from sim.scenario.model import FootageOptions
 from sim.scenario.parsing import ScenarioError

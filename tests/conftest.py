@@ -8,11 +8,11 @@ import pytest
 from hypothesis import settings
 
 from nodes.camera import look_at
-from nodes.filtering.color import ColorOptions
 from nodes.filtering.fusion import FusionOptions
-from nodes.filtering.observation import ObservationModel
-from nodes.filtering.target import TargetOptions, project_boxes
 from nodes.setup import FilterOptions, Start, TrackingSetup
+from nodes.vision.color import ColorOptions
+from nodes.vision.observation import ObservationModel
+from nodes.vision.target import TargetOptions, project_boxes
 
 # No verdict may depend on how busy the machine is.
 settings.register_profile("dcpf", deadline=None, max_examples=40)

@@ -16,10 +16,13 @@ OUTSIDE_WORLD = {
 """What would make the same arguments give another result, or has a life of its own."""
 
 PURE = (
-    *sorted((ROOT / "nodes/filtering").glob("*.py")),
+    *sorted((ROOT / "nodes/filtering").rglob("*.py")),
+    *sorted((ROOT / "nodes/vision").glob("*.py")),
     *sorted(path for path in (ROOT / "nodes/counting").glob("*.py") if path.name != "build.py"),
     *sorted((ROOT / "sim/metrics").glob("*.py")),
     ROOT / "sim/running/metrics.py",
+    *(ROOT / "sim/simulation" / name for name in ("gaussians.py", "sensor.py", "simulation.py")),
+    ROOT / "sim/scenario/cameras.py",
     *sorted((ROOT / "network/averaging").glob("*.py")),
     *sorted((ROOT / "nodes/simd").rglob("*.py")),
     *(
@@ -41,6 +44,8 @@ PURE = (
         ROOT / "sim" / name
         for name in (
             *("live/nodes.py", "live/setting.py", "live/story.py", "replay/playback.py"),
+            *("report/elements.py", "report/figures.py", "report/run_tables.py", "report/stills.py"),
+            "report/svg.py",
             *("recording/foxglove.py", "recording/scene.py", "recording/schemas.py"),
             *("faults/options.py", "faults/pictures.py", "faults/schedule.py"),
         )

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from network.averaging.algorithm import Algorithm, AlgorithmOptions
 from network.averaging.constant import ConstantWeights
 from network.graph import Graph
-from network.spectrum import spectrum_of
+from network.spectrum import extremes_of
 
 
 class BestConstant(AlgorithmOptions):
@@ -18,6 +18,6 @@ class BestConstant(AlgorithmOptions):
     algorithm: Literal["best_constant"] = "best_constant"
     """The constant weight that is best for this graph, 2 / (λ₂ + λ_N) of its Laplacian."""
 
-    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:  # noqa: ARG002 - good for any number of rounds
+    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:
         """Constant weights of that size."""
-        return ConstantWeights(epsilon=spectrum_of(graph).step)
+        return ConstantWeights(epsilon=extremes_of(graph).step)

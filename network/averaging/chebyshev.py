@@ -22,7 +22,7 @@ from jaxtyping import Float
 from network.averaging.algorithm import Algorithm, AlgorithmOptions, State, Vector
 from network.graph import Graph
 from network.messages import ConsensusMessage
-from network.spectrum import Spectrum, spectrum_of
+from network.spectrum import Spectrum, extremes_of
 
 
 class Chebyshev(AlgorithmOptions):
@@ -31,9 +31,9 @@ class Chebyshev(AlgorithmOptions):
     algorithm: Literal["chebyshev"] = "chebyshev"
     """Accelerated by the momentum that is best for this graph's λ₂ and λ_N."""
 
-    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:  # noqa: ARG002 - good for any number of rounds
+    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:
         """Chebyshev acceleration on this graph."""
-        return TunedChebyshev(spectrum_of(graph))
+        return TunedChebyshev(extremes_of(graph))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,11 +60,11 @@ class TunedChebyshev:
     spectrum: Spectrum
     uses_late: ClassVar[bool] = False
 
-    def begin(self, value: Vector, last: Flowing | None) -> Flowing:  # noqa: ARG002 - nothing is kept
+    def begin(self, value: Vector, last: Flowing | None) -> Flowing:
         """The node's own value, at rest."""
         return Flowing(value, 0.0, {})
 
-    def payload(self, state: Flowing, degree: int) -> Vector:  # noqa: ARG002 - the same for everybody
+    def payload(self, state: Flowing, degree: int) -> Vector:
         """The value."""
         return state.value
 

@@ -18,7 +18,7 @@ class ConstantWeights(Weights):
     epsilon: float = Field(gt=0, allow_inf_nan=False)
     """Step towards each neighbour in a round, no unit; below 1 / (largest number of neighbours)."""
 
-    def weight(self, own_degree: int, neighbor_degree: int) -> float:  # noqa: ARG002 - the rule that ignores them
+    def weight(self, own_degree: int, neighbor_degree: int) -> float:
         """ε, whatever the degrees."""
         return self.epsilon
 

@@ -21,15 +21,15 @@ class Weights(AlgorithmOptions):
         It must not change when the two are swapped: only then do the rounds preserve the average.
         """
 
-    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:  # noqa: ARG002 - degrees are all it needs
+    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:
         """The rule itself: it needs to know nothing of the graph."""
         return self
 
-    def begin(self, value: Vector, last: State | None) -> State:  # noqa: ARG002 - nothing is kept
+    def begin(self, value: Vector, last: State | None) -> State:
         """The node's own value."""
         return State(value)
 
-    def payload(self, state: State, degree: int) -> Vector:  # noqa: ARG002 - the same for everybody
+    def payload(self, state: State, degree: int) -> Vector:
         """The value."""
         return state.value
 

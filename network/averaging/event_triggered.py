@@ -74,15 +74,15 @@ class EventTriggered(AlgorithmOptions):
 
     uses_late: ClassVar[bool] = False
 
-    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:  # noqa: ARG002 - degrees are all it needs
+    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:
         """The algorithm itself."""
         return self
 
-    def begin(self, value: Vector, last: Talk | None) -> Talk:  # noqa: ARG002 - a frame's value is new
+    def begin(self, value: Vector, last: Talk | None) -> Talk:
         """The node's own value, of which nobody has heard."""
         return Talk(value, _silent(value), {})
 
-    def payload(self, state: Talk, degree: int) -> Vector:  # noqa: ARG002 - the same for everybody
+    def payload(self, state: Talk, degree: int) -> Vector:
         """The value if it has moved, nothing otherwise."""
         peaks = [np.abs(state.value), state.own.peak, *(voice.peak for voice in state.heard.values())]
         moved = distance(state.value, state.own.last, np.max(peaks, axis=0)) > self.threshold

@@ -80,7 +80,7 @@ class TunedFiniteTime:
         """The node's own value; an alarm lives on from frame to frame."""
         return Watchful(value, last.alarm if last else 0)
 
-    def payload(self, state: Watchful, degree: int) -> Vector:  # noqa: ARG002 - the same for everybody
+    def payload(self, state: Watchful, degree: int) -> Vector:
         """The value, and the alarm if there is one."""
         return np.append(state.value, state.alarm) if state.alarm else state.value
 

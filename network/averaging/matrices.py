@@ -9,6 +9,7 @@ of the residual from one round to the next, in the limit.
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -16,8 +17,10 @@ from scipy import sparse
 
 from network.averaging.algorithm import metropolis_weight
 from network.averaging.chebyshev import next_relaxation
+from network.averaging.finite_time import leja_order
 from network.graph import Graph
-from network.spectrum import Spectrum
+from network.spectrum import Spectrum, extremes_of, spectrum_of
+from network.weights import ConsensusOptions
 
 Rounds = Iterator[Float[np.ndarray, "C K"]]
 """The values before the first round, after it, after the second, without end."""
@@ -79,6 +82,33 @@ def ratio(L: sparse.csr_array, values: Float[np.ndarray, "C K"]) -> Rounds:
     while True:
         yield mass[:, :-1] / mass[:, -1:]
         mass = mass - L @ (shares * mass)
+
+
+def rounds(options: ConsensusOptions, graph: Graph) -> Callable[[Float[np.ndarray, "C K"]], Rounds]:
+    """The rounds of the algorithm that a scenario has chosen, to be started with any values.
+
+    Raises:
+        ValueError: It has no matrices, since what is sent depends on the values.
+    """
+    match options.algorithm:
+        case "constant":
+            return partial(linear, laplacian(graph), step=options.epsilon)
+        case "metropolis":
+            return partial(linear, metropolis_laplacian(graph))
+        case "best_constant":
+            return partial(linear, laplacian(graph), step=extremes_of(graph).step)
+        case "chebyshev":
+            return partial(chebyshev, laplacian(graph), spectrum=extremes_of(graph))
+        case "finite_time":
+            roots = leja_order(np.array(spectrum_of(graph).eigenvalues))
+            return partial(finite_time, laplacian(graph), roots=roots)
+        case "ratio":
+            return partial(ratio, laplacian(graph))
+        case "event_triggered":
+            raise ValueError(
+                "event_triggered sends by thresholds, which no matrix does: choose another algorithm, such as"
+                " metropolis, which it follows"
+            )
 
 
 def linear_rate(L: sparse.csr_array, step: float = 1.0) -> float:

@@ -45,11 +45,11 @@ class Ratio(AlgorithmOptions):
 
     uses_late: ClassVar[bool] = True
 
-    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:  # noqa: ARG002 - it needs to know nothing
+    def tuned(self, graph: Graph, iterations: int) -> Algorithm[Any]:
         """The algorithm itself."""
         return self
 
-    def begin(self, value: Vector, last: Masses | None) -> Masses:  # noqa: ARG002 - sums are a frame's
+    def begin(self, value: Vector, last: Masses | None) -> Masses:
         """The node's own value with a weight of 1."""
         mass = np.append(value, 1.0)
         return Masses(value, mass, np.zeros_like(mass), {})

@@ -79,5 +79,8 @@ def _build(compiler: list[str], library: Path) -> None:
         except subprocess.TimeoutExpired as error:
             raise KernelError(f"{compiler[0]} took longer than {BUILD_LIMIT_S:.0f} s: try again") from error
         if done.returncode:
-            raise KernelError(f"{compiler[0]} could not compile {SOURCE.name}: {done.stderr.strip()[-300:]}")
+            raise KernelError(
+                f"filter.backend compiled: {compiler[0]} could not compile {SOURCE.name}:"
+                f" {done.stderr.strip()[-300:]}: name another in CC, or take filter.backend: fast"
+            )
         made.replace(library)

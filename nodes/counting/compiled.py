@@ -63,7 +63,7 @@ class Coding:
         tables: What blue, green and red add to it.
         hue_bins: If above 0, the index is the bin of the hue instead.
         grey: Which pixels have no hue: the chroma and the saturation below which they have none, and full
-            saturation; see `nodes.filtering.hue.hue_bins`.
+            saturation; see `nodes.vision.hue.hue_bins`.
     """
 
     tables: UInt16[np.ndarray, "3 256"]
@@ -146,7 +146,7 @@ def distances_compiled(
     grid: tuple[int, int] | None,
     kernel: str,
 ) -> Float[np.ndarray, " N"]:
-    """Finds d² of each box to the reference, as `nodes.filtering.pattern.squared_distances` defines it.
+    """Finds d² of each box to the reference, as `nodes.vision.pattern.squared_distances` defines it.
 
     Args:
         image: The picture, blue, green, red.
@@ -194,13 +194,13 @@ def _run(
     found = np.zeros(at_pixels + 4 * n * len(book.part_heights), np.uint8)
     samples, _kept = _samples(grid, kernel, book.part_heights)
     picture = _Picture(
-        *(image.ctypes.data, image.strides[0], *image.shape[:2]),
+        *(_address(image), image.strides[0], *image.shape[:2]),
         *(coding.address, coding.hue_bins, *coding.grey),
     )
-    address = found.ctypes.data
+    address = _address(found)
     failed = load_kernel().dcpf_count(
         *(ctypes.byref(picture), ctypes.byref(reference.structure), ctypes.byref(samples)),
-        *(_pointer(boxes.ctypes.data), _int32(n)),
+        *(_pointer(_address(boxes)), _int32(n)),
         *(_pointer(address), _pointer(address + at_counts), _pointer(address + at_pixels)),
     )
     if failed:
@@ -208,3 +208,8 @@ def _run(
             f"the boxes cover too much of a picture of {image.shape[1]} x {image.shape[0]} pixels"
         )
     return found
+
+
+def _address(array: np.ndarray) -> int:
+    """Where an array's numbers are; `array.ctypes` takes longer."""
+    return int(array.__array_interface__["data"][0])

@@ -18,7 +18,7 @@ typedef struct {
     int64_t stride;        /* bytes from a row to the next */
     int32_t height, width;
     const uint16_t *index; /* three tables of 256: joint index = index[b] + index[256 + g] + index[512 + r], or */
-    int32_t hue_bins;      /* if above 0, the bin of the hue, as nodes/filtering/color.py has it */
+    int32_t hue_bins;      /* if above 0, the bin of the hue, as nodes/vision/color.py has it */
     int32_t grey_chroma, grey_saturation, full_saturation;
 } picture;
 

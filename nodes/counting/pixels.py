@@ -4,6 +4,7 @@ Source: Porikli, "Integral histogram" (CVPR 2005), on the boxes' region and for 
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -12,8 +13,10 @@ from jaxtyping import Float, Int, Integer, UInt8
 from nodes.counting.codebook import PLACES, Block, Codebook, Images
 
 FOUR_TIMES = np.uint32(0x01010101)
-CHUNK_BYTES = 700_000
+CHUNK_BYTES = 350_000
 """Integral images that are made at once: what stays in a core's cache. Everything at once is half as fast."""
+JOINED_ROWS = 8
+"""Rows of pixels that are compared at once: NumPy takes its time between one piece of memory and the next."""
 BOX_COST, PIXEL_COST = 3000, 2
 """What one box costs directly, and each of its pixels, in units of one colour in one pixel of an integral."""
 
@@ -26,12 +29,14 @@ class PixelBoxes:
         sides: left and right of each.
         bounds: Where each part of each begins, and where the last one ends.
         region: left, top, right, bottom of what they cover, in the picture; at least one pixel.
+        rows: The first row of each part, and the one after its last.
         book: The colours that are told apart.
     """
 
     sides: Int[np.ndarray, "2 N"]
     bounds: Int[np.ndarray, "P1 N"]
     region: tuple[int, int, int, int]
+    rows: tuple[tuple[int, int], ...]
     book: Codebook
 
     def count(
@@ -49,14 +54,16 @@ class PixelBoxes:
         n_codes, (n_channels, height, width) = len(book.part), bins.shape
         sides, bounds = self.sides - left, self.bounds - top
         pixels = (bounds[1:] - bounds[:-1]) * (sides[1] - sides[0])
-        direct = n_channels * (BOX_COST * pixels.size + PIXEL_COST * int(pixels.sum()))
         # one row more, for places that no code has
         counts = np.zeros((n_codes + 1, sides.shape[1]), dtype=np.int32)
-        if direct < n_codes * height * width:
+        left_for_pixels = n_codes * height * width - n_channels * BOX_COST * pixels.size
+        if left_for_pixels > 0 and n_channels * PIXEL_COST * int(pixels.sum()) < left_for_pixels:
             _one_by_one(bins, sides, bounds, book, counts)
         else:
             for part, images in enumerate(book.images):
-                _from_integrals(bins, sides, bounds[part : part + 2], images, counts)
+                first, last = self.rows[part]
+                of_part = bins[:, first - top : last - top]
+                _from_integrals(of_part, sides, self.bounds[part : part + 2] - first, images, counts)
         return counts[:n_codes], pixels
 
 
@@ -69,17 +76,36 @@ def pixel_boxes(boxes: Float[np.ndarray, "N 4"], size_px: tuple[int, int], book:
         book: The colours that are told apart.
     """
     # A pixel belongs to a box that holds its centre; NaN becomes an empty box.
-    limits = np.array(size_px * 2, float)
-    cells = np.minimum(np.fmax(np.floor(boxes + 0.5), 0), limits).astype(np.intp).T
+    edges, (width, height) = np.add(boxes.T, 0.5, order="C"), size_px
+    cells = _whole_pixels(edges, np.array([[width], [height], [width], [height]], float))
     sides, bounds = cells[::2], cells[1::2]
+    low = np.minimum.reduce(cells, axis=1, initial=max(size_px)).tolist()
+    high = np.maximum.reduce(cells, axis=1, initial=0).tolist()
+    region = _at_least_one_pixel(min(low[0], width - 1), min(low[1], height - 1), high[2], high[3])
+    rows: tuple[tuple[int, int], ...] = ((region[1], region[3]),)
     inner = book.part_edges[1:-1, None]
     if len(inner):
         top, bottom = boxes.T[1::2]
-        between = np.minimum(np.fmax(np.floor(top + inner * (bottom - top) + 0.5), 0), limits[1])
-        bounds = np.concatenate([bounds[:1], between.astype(np.intp), bounds[1:]])
-    left, top = int(sides[0].min(initial=size_px[0] - 1)), int(bounds[0].min(initial=size_px[1] - 1))
-    region = left, top, int(sides[1].max(initial=left + 1)), int(bounds[-1].max(initial=top + 1))
-    return PixelBoxes(sides, bounds, region, book)
+        between = _whole_pixels(top + inner * (bottom - top) + 0.5, height)
+        bounds = np.concatenate([bounds[:1], between, bounds[1:]])
+        rows = tuple(
+            (int(begin.min(initial=height - 1)), int(end.max(initial=0))) for begin, end in pairwise(bounds)
+        )
+    return PixelBoxes(sides, bounds, region, rows, book)
+
+
+def _at_least_one_pixel(left: int, top: int, right: int, bottom: int) -> tuple[int, int, int, int]:
+    return left, top, max(right, left + 1), max(bottom, top + 1)
+
+
+def _whole_pixels(
+    edges: Float[np.ndarray, "E N"], sizes: int | Float[np.ndarray, "E 1"]
+) -> Int[np.ndarray, "E N"]:
+    """Whole pixels within the picture, 0 for NaN; writes into its argument."""
+    np.floor(edges, out=edges)
+    np.fmax(edges, 0, out=edges)
+    np.minimum(edges, sizes, out=edges)
+    return edges.astype(np.intp)
 
 
 def _one_by_one(
@@ -104,45 +130,64 @@ def _from_integrals(
     of_part: tuple[Images, ...],
     counts: Int[np.ndarray, "K1 N"],
 ) -> None:
-    """Counts one part's codes from integral images."""
-    first_row, last_row = int(bounds[0].min()), int(bounds[1].max())
-    height, width, n_boxes = last_row - first_row, bins.shape[2], sides.shape[1]
-    # Where a box's corners lie in an integral image: I(b, r) + I(t, l) - I(t, r) - I(b, l)
-    rows = (bounds - first_row) * (width + 1)
-    corners = rows[[1, 0, 0, 1]] + sides[[1, 0, 1, 0]]
-    n_rows = height + 1
+    """Counts one part's codes from integral images.
+
+    Args:
+        bins: Of the part's rows of the region.
+        sides: Of the boxes, from the region's left side.
+        bounds: Where the part begins and ends in each box, from its first row.
+        of_part: What is counted.
+        counts: Where the counts are put.
+    """
+    (_, height, width), n_boxes = bins.shape, sides.shape[1]
+    # Integrals lie one below the other, at least a row apart: each has rows and columns from 0 to its height
+    # and width.
+    n_pieces = height // JOINED_ROWS + 1
+    n_rows, piece = n_pieces * JOINED_ROWS, JOINED_ROWS * width * PLACES
     at_once = max(1, CHUNK_BYTES // (4 * PLACES * n_rows * (width + 1)))
-    # one below the other and a row apart: each integral has rows and columns from 0 to its height and width
-    planes = np.empty((at_once, n_rows, width * PLACES), bool)
+    # Where a box's corners lie in an integral image: I(t, l), I(t, r), I(b, l), I(b, r)
+    corners = ((bounds * (width + 1))[:, None] + sides).reshape(4, n_boxes)
+    planes = np.empty((at_once, n_pieces, piece), bool)
     integrals = np.empty((at_once * n_rows + 1, width + 1, PLACES), np.int32)
     for images in of_part:
-        pixels, n_images = _numbers(bins[:, first_row:last_row], images.block), len(images.numbers)
-        fours = np.repeat(images.numbers.view(np.uint32), width)
-        alike = fours.view(np.uint8).reshape(n_images, 1, width * PLACES)
+        pixels = _numbers(bins, images.block, n_rows).reshape(n_pieces, piece)
+        n_images = len(images.numbers)
+        fours = images.numbers.view(np.uint32).repeat(piece // PLACES)
+        alike = fours.view(np.uint8).reshape(n_images, 1, piece)
         found = np.empty((n_images, 4, n_boxes), np.complex128)
         for first in range(0, n_images, at_once):
             n = min(at_once, n_images - first)
-            np.equal(pixels, alike[first : first + n], out=planes[:n, :height])
+            np.equal(pixels, alike[first : first + n], out=planes[:n])
             marked = planes[:n].view(np.uint8).reshape(n * n_rows, width, PLACES)
             # four sums side by side are one entry of 16 bytes
             entries = cv2.integral(marked, integrals[: n * n_rows + 1]).view(np.complex128).ravel()
             by_image = entries[: n * n_rows * (width + 1)].reshape(n, -1)
             by_image.take(corners, axis=1, mode="clip", out=found[first : first + n])
         sums = found.view(np.int32).reshape(n_images, 4, n_boxes * PLACES)
-        total = sums[:, 0] + sums[:, 1]
-        total -= sums[:, 2]
-        total -= sums[:, 3]
+        # bottom right, less what is left of the box, less what is above it, and what is both
+        total = sums[:, 3] - sums[:, 2]
+        total -= sums[:, 1]
+        total += sums[:, 0]
         counts[images.codes] = total.reshape(n_images, n_boxes, PLACES).swapaxes(1, 2)
     counts[-1] = 0
 
 
-def _numbers(bins: Integer[np.ndarray, "C h w"], block: Block | None) -> UInt8[np.ndarray, "h w4"]:
-    """Four numbers of each pixel side by side: its three bins and one to spare, or four times the same."""
+def _numbers(
+    bins: Integer[np.ndarray, "C h w"], block: Block | None, n_rows: int
+) -> UInt8[np.ndarray, "n_rows w4"]:
+    """Four numbers of each pixel side by side: its three bins and one to spare, or four times the same.
+
+    Below them are rows of whatever number, to be `n_rows` in all.
+    """
     _, height, width = bins.shape
-    if block is not None:
-        numbers = (bins[0] if bins.dtype == np.uint8 else block.table.take(bins[0])).astype(np.uint32)
-        numbers *= FOUR_TIMES
-        return numbers.view(np.uint8)
-    if bins.strides[0] == 1 and bins.strides[2] == PLACES:  # as `quantize` leaves them in memory
-        return np.lib.stride_tricks.as_strided(bins[0], (height, width * PLACES), (bins.strides[1], 1))
-    return np.asarray(cv2.merge([*bins, bins[0]]), dtype=np.uint8).reshape(height, width * PLACES)
+    numbers = np.zeros((n_rows, width, PLACES), np.uint8)
+    if block is None:
+        beside = bins.transpose(1, 2, 0)
+        if beside.strides[1:] == (PLACES, 1):  # as `quantize` leaves them in memory
+            beside = np.lib.stride_tricks.as_strided(beside, (height, width, PLACES))
+        numbers[:height, :, : beside.shape[2]] = beside
+    elif bins.dtype == np.uint8:
+        np.multiply(bins[0], FOUR_TIMES, out=numbers.view(np.uint32)[:height, :, 0])
+    else:
+        (block.table * FOUR_TIMES).take(bins[0], out=numbers.view(np.uint32)[:height, :, 0], mode="clip")
+    return numbers.reshape(n_rows, width * PLACES)

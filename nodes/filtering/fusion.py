@@ -1,54 +1,81 @@
 """The fusion filter: what a camera sends, and how the network's average updates its particles.
 
-Source: Jing & Chen, section 3.2, Eq. 15-17. The average times the number of cameras is the sum: information
-adds up. Eq. 17 as printed divides two Gaussians whose ratio need not be a density; the other rules send the
-net information about the position, which always is one.
+Sources: Jing & Chen, section 3.2, Eq. 15-17, and the rules in `nodes.filtering.rules`. The average times the
+number of cameras is the sum: information adds up. Where a rule's average is a whole posterior, the particles
+are drawn from it, as in the Gaussian particle filter (Kotecha & Djuric 2003).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from network.codec import pack_symmetric, unpack_symmetric
 from network.options import Options
-from nodes.filtering.gaussian import (
-    Information,
-    fit_log_quadratic,
-    log_factor,
-    net_information,
-    to_information,
-)
-from nodes.filtering.local import LocalResult
+from nodes.filtering.gaussian import Information, Moments, log_factor, regularized
+from nodes.filtering.local import LocalGaussians, LocalResult
 from nodes.filtering.motion import MotionModel, predict, transition
-from nodes.filtering.particles import Particles, reweight
+from nodes.filtering.particles import Particles, reweight, uniform_log_weights
+from nodes.filtering.rules.covariance_intersection import CovarianceIntersection
+from nodes.filtering.rules.factors import Eq17, MeasuredSum
+from nodes.filtering.rules.hybrid import Hybrid
+from nodes.filtering.rules.icf import InformationWeighted
+from nodes.filtering.rules.naive import NaiveAverage
+from nodes.filtering.rules.rule import Rule
+from nodes.filtering.sighting import shrinkage, shrinkage_by
+
+RuleName = Literal[
+    "eq17", "net_information", "quadratic_fit", "naive", "covariance_intersection", "hybrid", "icf"
+]
 
 
 class FusionOptions(Options):
     """How the cameras' results become one."""
 
-    rule: Literal["eq17", "net_information", "quadratic_fit"] = "net_information"
+    rule: RuleName = "net_information"
     """`eq17`: the ratio N(u, p)/N(v, r) as printed; `net_information`: its part that is a density, on the
-    position; `quadratic_fit`: a concave quadratic fitted to the log-likelihood over the particles."""
+    position; `quadratic_fit`: a concave quadratic fitted to the log-likelihood over the particles. To compare
+    with: `naive`, the mean of the estimates; `covariance_intersection`; `hybrid` consensus on measurements
+    and information; `icf`, the information-weighted consensus filter."""
     local_particles: Literal["own", "shared"] = "shared"
     """`own`: the local filter keeps particles of its own, as the text has it; `shared`: it weights the fusion
     filter's, as Algorithm 1 has it, so that a blind camera contributes exactly nothing."""
     proposal: Literal["prior", "optimal"] = "optimal"
     """`prior`: P(x(k) | x(k-1)), as in the paper; `optimal`: given the fused Gaussian as
-    well, in closed form."""
+    well, in closed form. The rules to compare with have no proposal: their Gaussian is drawn from."""
     ridge: float = Field(default=1e-10, gt=0)
     """Added to the diagonals of covariances before they are inverted, in squared units of the state."""
 
+    @model_validator(mode="after")
+    def _prediction_is_the_networks(self) -> "FusionOptions":
+        if self.rule in ("hybrid", "icf") and self.local_particles == "own":
+            raise ValueError(
+                f"rule {self.rule} averages the fusion filter's predictions, and local_particles is own: set"
+                " local_particles to shared"
+            )
+        return self
+
+
+RULES: Mapping[RuleName, Rule] = {
+    "eq17": Eq17(),
+    "net_information": MeasuredSum("moments"),
+    "quadratic_fit": MeasuredSum("log_likelihood"),
+    "naive": NaiveAverage(),
+    "covariance_intersection": CovarianceIntersection(),
+    "hybrid": Hybrid(),
+    "icf": InformationWeighted(),
+}
+"""All rules by their names in a scenario."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fused:
-    """The network's sum as the fusion filter uses it.
+class Factor:
+    """The network's sum, as a factor on the fusion filter's weights.
 
     Attributes:
-        gain: Factor on the weights: information after minus information before (Eq. 17), over the state or
-            its position.
+        gain: Information after minus information before (Eq. 17), over the state or its position.
         is_density: Whether the factor's information matrix is positive semidefinite.
     """
 
@@ -56,46 +83,48 @@ class Fused:
     is_density: bool
 
 
-def pack(result: LocalResult, options: FusionOptions) -> Float[np.ndarray, " K"]:
+@dataclass(frozen=True, slots=True, eq=False)
+class Posterior:
+    """The network's answer as a whole: what a camera knew before is in it.
+
+    Attributes:
+        moments: Of the state.
+        is_density: Whether its covariance is positive definite.
+    """
+
+    moments: Moments
+    is_density: bool
+
+
+Fused = Factor | Posterior
+"""The network's average as the fusion filter uses it."""
+
+
+def pack(result: LocalResult, n_cameras: int, options: FusionOptions) -> Float[np.ndarray, " K"]:
     """The vector that consensus averages: five numbers on a plane, 28 for Eq. 17 as printed.
 
     Args:
         result: Of the local filter.
+        n_cameras: How many cameras take part.
         options: The rule.
 
     Returns:
-        Information matrices as upper triangles, each followed by its vector.
+        Symmetric matrices as upper triangles, each followed by its vector.
     """
-    if options.rule == "eq17":
-        after = to_information(result.posterior, options.ridge)
-        before = to_information(result.predicted, options.ridge)
-        return np.concatenate(
-            [pack_symmetric(after.matrix), after.vector, pack_symmetric(before.matrix), before.vector]
-        )
-    information = _position_information(result, options)
-    return np.concatenate([pack_symmetric(information.matrix), information.vector])
+    return RULES[options.rule].pack(LocalGaussians(result, options.ridge), n_cameras)
 
 
 def packed_size(n_states: int, options: FusionOptions) -> int:
     """How many numbers `pack` gives, for D states."""
-    size = n_states if options.rule == "eq17" else n_states // 2
-    return (size * (size + 1) // 2 + size) * (2 if options.rule == "eq17" else 1)
-
-
-def _position_information(result: LocalResult, options: FusionOptions) -> Information:
-    if options.rule == "net_information":
-        return net_information(result.posterior.position(), result.predicted.position(), options.ridge)
-    # halfway between prior and posterior, where the fused result will be
-    halfway = reweight(result.prior, 0.5 * result.log_likelihoods)
-    return fit_log_quadratic(halfway.positions, result.log_likelihoods, halfway.weights)
+    return RULES[options.rule].size(n_states)
 
 
 def is_density(result: LocalResult, options: FusionOptions) -> bool:
     """Whether p⁻¹ - r⁻¹ of a camera is positive semidefinite, as Eq. 17 takes for granted."""
     if options.rule != "eq17":
         return True
-    after = to_information(result.posterior, options.ridge).matrix
-    return _is_semidefinite(after - to_information(result.predicted, options.ridge).matrix)
+    local = LocalGaussians(result, options.ridge)
+    return _is_semidefinite(local.after.matrix - local.before.matrix)
 
 
 def _is_semidefinite(matrix: Float[np.ndarray, "D D"]) -> bool:
@@ -103,7 +132,7 @@ def _is_semidefinite(matrix: Float[np.ndarray, "D D"]) -> bool:
 
 
 def unpack(average: Float[np.ndarray, " K"], n_cameras: int, n_states: int, options: FusionOptions) -> Fused:
-    """The network's sum from its average (Eq. 15-16).
+    """What the network's average means (Eq. 15-16).
 
     Args:
         average: Of the cameras' packed vectors.
@@ -111,17 +140,21 @@ def unpack(average: Float[np.ndarray, " K"], n_cameras: int, n_states: int, opti
         n_states: D.
         options: The rule that packed it.
     """
-    gain, size = n_cameras * average, n_states // 2
-    if options.rule == "eq17":
-        # N(χ; u, p) / N(χ; v, r), with p⁻¹ = N X_c1, p⁻¹u = N x_c2, r⁻¹ = N X_c3, r⁻¹v = N x_c4
-        after, before = np.split(gain, 2)
-        gain, size = after - before, n_states
-    split = size * (size + 1) // 2
-    matrix = unpack_symmetric(gain[:split], size)
-    return Fused(Information(matrix, gain[split:]), _is_semidefinite(matrix))
+    answer = RULES[options.rule].unpack(average, n_cameras, n_states)
+    if isinstance(answer, Information):
+        return Factor(answer, _is_semidefinite(answer.matrix))
+    p = answer.covariance
+    return Posterior(answer, bool(np.isfinite(p).all() and np.linalg.eigvalsh(p)[0] > 0))
 
 
-def reweight_by_ratio(predicted: Particles, fused: Fused) -> Particles:
+def left_of(prior: Moments, fused: Fused) -> float:
+    """The part of the position's covariance that the network's answer leaves, 1 where it tells nothing."""
+    if isinstance(fused, Factor):
+        return shrinkage_by(fused.gain, prior)
+    return shrinkage(prior.position(), fused.moments.position()) if fused.is_density else 1.0
+
+
+def reweight_by_ratio(predicted: Particles, fused: Factor) -> Particles:
     """ω(k) = ω(k-1) N(χ; u, p) / N(χ; v, r), with the prior as proposal (Eq. 17)."""
     points = predicted.states[:, : len(fused.gain.vector)]
     center = predicted.weights @ points
@@ -129,7 +162,7 @@ def reweight_by_ratio(predicted: Particles, fused: Fused) -> Particles:
 
 
 def draw_optimal(
-    previous: Particles, fused: Fused, motion: MotionModel, rng: np.random.Generator
+    previous: Particles, fused: Factor, motion: MotionModel, rng: np.random.Generator
 ) -> Particles:
     """Draws from P(x(k) | x(k-1), fused factor), and weights by its normaliser.
 
@@ -156,6 +189,14 @@ def draw_optimal(
     return reweight(Particles(states, previous.log_weights), normalizer)
 
 
+def draw_posterior(fused: Posterior, n_particles: int, ridge: float, rng: np.random.Generator) -> Particles:
+    """Equally weighted draws from the network's posterior."""
+    # x = u + L z, p = L Lᵀ
+    L = np.linalg.cholesky(regularized(fused.moments.covariance, ridge))
+    z = rng.standard_normal((n_particles, len(L)))
+    return Particles(fused.moments.mean + z @ L.T, uniform_log_weights(n_particles))
+
+
 def fuse(
     previous: Particles,
     predicted: Particles,
@@ -164,7 +205,7 @@ def fuse(
     options: FusionOptions,
     rng: np.random.Generator,
 ) -> Particles:
-    """The fusion filter's posterior from its particles of the frame before and the fused factor.
+    """The fusion filter's posterior from its particles of the frame before and the network's answer.
 
     Args:
         previous: The particles of the frame before.
@@ -174,6 +215,9 @@ def fuse(
         options: The proposal.
         rng: The fusion filter's stream.
     """
+    if isinstance(fused, Posterior):
+        n = len(predicted.log_weights)
+        return draw_posterior(fused, n, options.ridge, rng) if fused.is_density else predicted
     # Where nobody saw anything, the prediction stands.
     if not (fused.gain.matrix.any() or fused.gain.vector.any()):
         return predicted

@@ -12,43 +12,46 @@ from jaxtyping import Float
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moments:
-    """A Gaussian by its mean and covariance."""
+    """A Gaussian by its mean and covariance, or one for each of many nodes."""
 
-    mean: Float[np.ndarray, " D"]
-    covariance: Float[np.ndarray, "D D"]
+    mean: Float[np.ndarray, "*C D"]
+    covariance: Float[np.ndarray, "*C D D"]
 
     def position(self) -> "Moments":
         """The marginal of the position, the first half of the state."""
-        half = len(self.mean) // 2
-        return Moments(self.mean[:half], self.covariance[:half, :half])
+        half = self.mean.shape[-1] // 2
+        return Moments(self.mean[..., :half], self.covariance[..., :half, :half])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Information:
-    """A Gaussian factor exp(-½ xᵀ Λ x + xᵀ η) by its information matrix Λ and information vector η."""
+    """A Gaussian factor exp(-½ xᵀ Λ x + xᵀ η) by its matrix Λ and vector η, or one for each of many nodes."""
 
-    matrix: Float[np.ndarray, "D D"]
-    vector: Float[np.ndarray, " D"]
+    matrix: Float[np.ndarray, "*C D D"]
+    vector: Float[np.ndarray, "*C D"]
 
 
 def moments(states: Float[np.ndarray, "N D"], weights: Float[np.ndarray, " N"]) -> Moments:
     """Weighted mean and covariance of a sample (Eq. 9-10 and 13-14)."""
+    # One row a component: NumPy is quick along the long axis only.
+    components = np.array(states.T, order="C")
     # u = Σ ωⱼ χⱼ
-    mean = weights @ states
+    mean = components @ weights
     # p = Σ ωⱼ (χⱼ - u)(χⱼ - u)ᵀ, centred before the product
-    centered = states - mean
-    covariance = (centered * weights[:, None]).T @ centered
+    components -= mean[:, None]
+    covariance = (components * weights) @ components.T
     return Moments(mean, (covariance + covariance.T) / 2)
 
 
-def regularized(covariance: Float[np.ndarray, "D D"], ridge: float) -> Float[np.ndarray, "D D"]:
+def regularized(covariance: Float[np.ndarray, "*C D D"], ridge: float) -> Float[np.ndarray, "*C D D"]:
     """A covariance that can be inverted, also that of a sample collapsed to a line or a point.
 
     Args:
         covariance: Of a sample; positive semidefinite up to rounding.
         ridge: Added to the diagonal, above 0; a little of the trace is as well, for a ridge below rounding.
     """
-    return covariance + (ridge + 1e-12 * np.trace(covariance)) * np.eye(len(covariance))
+    trace = np.asarray(np.trace(covariance, axis1=-2, axis2=-1))[..., None, None]
+    return covariance + (ridge + 1e-12 * trace) * np.eye(covariance.shape[-1])
 
 
 def no_information(n: int) -> Information:
@@ -59,8 +62,17 @@ def no_information(n: int) -> Information:
 def to_information(gaussian: Moments, ridge: float) -> Information:
     """From p and u to p⁻¹ and p⁻¹u, which Eq. 3 averages; `ridge` is added to the diagonal of p."""
     matrix = np.linalg.inv(regularized(gaussian.covariance, ridge))
-    matrix = (matrix + matrix.T) / 2
-    return Information(matrix, matrix @ gaussian.mean)
+    matrix = (matrix + matrix.swapaxes(-2, -1)) / 2
+    return Information(matrix, np.matvec(matrix, gaussian.mean))
+
+
+def to_moments(information: Information) -> Moments:
+    """From p⁻¹ and p⁻¹u to u and p; NaN where p⁻¹ is not positive definite, so that it is nobody's."""
+    # p⁻¹ = V diag(m) Vᵀ
+    m, V = np.linalg.eigh(information.matrix)
+    m = np.where(m[..., :1] > 0, m, np.nan)
+    covariance = (V / m[..., None, :]) @ V.swapaxes(-2, -1)
+    return Moments(np.matvec(covariance, information.vector), covariance)
 
 
 def log_factor(

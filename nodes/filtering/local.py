@@ -8,8 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from nodes.filtering.gaussian import Moments, moments
+from nodes.filtering.gaussian import (
+    Information,
+    Moments,
+    fit_log_quadratic,
+    moments,
+    net_information,
+    to_information,
+)
 from nodes.filtering.particles import Particles, reweight
+from nodes.filtering.rules.rule import LocalEstimate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,3 +53,43 @@ def local_filter(predicted: Particles, log_likelihoods: Float[np.ndarray, " N"])
     # u, p: with the updated weights (Eq. 13-14)
     after = moments(posterior.states, posterior.weights)
     return LocalResult(before, after, predicted, posterior, log_likelihoods)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalGaussians(LocalEstimate):
+    """A local filter's result in the forms that rules ask for; what no rule asks for costs nothing.
+
+    Attributes:
+        result: Of the local filter.
+        ridge: Added to covariances' diagonals before they are inverted.
+    """
+
+    result: LocalResult
+    ridge: float
+
+    @property
+    def posterior(self) -> Moments:
+        """Mean u and covariance p."""
+        return self.result.posterior
+
+    @property
+    def after(self) -> Information:
+        """p⁻¹ and p⁻¹u."""
+        return to_information(self.result.posterior, self.ridge)
+
+    @property
+    def before(self) -> Information:
+        """r⁻¹ and r⁻¹v."""
+        return to_information(self.result.predicted, self.ridge)
+
+    @property
+    def measured(self) -> Information:
+        """The net information about the position, from the moments before and after."""
+        return net_information(self.result.posterior.position(), self.result.predicted.position(), self.ridge)
+
+    @property
+    def fitted(self) -> Information:
+        """The quadratic fitted to the log-likelihood over the particles."""
+        # halfway between prior and posterior, where the fused result will be
+        halfway = reweight(self.result.prior, 0.5 * self.result.log_likelihoods)
+        return fit_log_quadratic(halfway.positions, self.result.log_likelihoods, halfway.weights)

@@ -8,6 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from nodes.threads import in_shares
+
+LEAST_OUTPUTS = 15_000
+"""New particles that a thread draws at least; for fewer it is not worth its start."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Particles:
@@ -78,7 +83,7 @@ def normalize(log_weights: Float[np.ndarray, " N"]) -> tuple[Float[np.ndarray, "
 def reweight(particles: Particles, log_factors: Float[np.ndarray, " N"]) -> Particles:
     """Multiplies the weights by factors given as logarithms, and normalises (Eq. 12)."""
     # A flat likelihood says nothing, and changes nothing to the last bit.
-    if np.all(log_factors == log_factors[0]):
+    if (log_factors == log_factors[0]).all():
         return particles
     # ω(k) ∝ ω(k-1) · factor
     log_weights, _ = normalize(particles.log_weights + log_factors)
@@ -87,7 +92,8 @@ def reweight(particles: Particles, log_factors: Float[np.ndarray, " N"]) -> Part
 
 def effective_sample_size(particles: Particles) -> float:
     """1 / Σ ω²: how many equally weighted particles the sample is worth."""
-    return float(np.exp(-np.logaddexp.reduce(2 * particles.log_weights)))
+    weights = particles.weights
+    return float(1 / (weights @ weights))
 
 
 def systematic_indices(weights: Float[np.ndarray, " N"], offset: float) -> Int[np.ndarray, " N"]:
@@ -101,15 +107,56 @@ def systematic_indices(weights: Float[np.ndarray, " N"], offset: float) -> Int[n
         The ancestor of each new particle; particle i has floor or ceil of N·ωᵢ children.
     """
     n = len(weights)
-    # The last particle that has any weight takes all above, and with it the rounding error of the sum.
-    last = np.flatnonzero(weights)[-1]
-    return np.searchsorted(np.cumsum(weights[:last]), (np.arange(n) + offset) / n, side="right")
+    return _ancestors(_upper_edges(weights), slice(0, n), n, offset)
 
 
-def resample_if_degenerate(particles: Particles, ess_threshold: float, rng: np.random.Generator) -> Particles:
+def _upper_edges(weights: Float[np.ndarray, " N"]) -> Float[np.ndarray, " K"]:
+    """Where the interval of each particle ends on the line from 0 to 1, but for the last with any weight.
+
+    That one takes all above, and with it the rounding error of the sum.
+    """
+    last = len(weights) - 1 - int((weights[::-1] > 0).argmax())
+    return weights[:last].cumsum()
+
+
+def _ancestors(
+    upper_edges: Float[np.ndarray, " K"], outputs: slice, n: int, offset: float
+) -> Int[np.ndarray, " M"]:
+    """Each output finds its own ancestor by itself (Truong & Kim, Algorithm 1)."""
+    draws = np.arange(outputs.start, outputs.stop, dtype=float)
+    draws += offset
+    draws /= n
+    return upper_edges.searchsorted(draws, side="right")
+
+
+def resample_if_degenerate(
+    particles: Particles, ess_threshold: float, rng: np.random.Generator, n_threads: int = 1
+) -> Particles:
     """Resamples where the effective sample size is below `ess_threshold` times n (Algorithm 1, step 7)."""
     n = len(particles.log_weights)
     if effective_sample_size(particles) >= ess_threshold * n:
         return particles
-    ancestor_indices = systematic_indices(particles.weights, float(rng.random()))
-    return Particles(particles.states[ancestor_indices], uniform_log_weights(n))
+    return resample(particles, float(rng.random()), n_threads)
+
+
+def resample(
+    particles: Particles, offset: float, n_threads: int = 1, least: int = LEAST_OUTPUTS
+) -> Particles:
+    """Equally weighted particles by `systematic_indices`.
+
+    Args:
+        particles: Weighted ones.
+        offset: A uniform draw from [0, 1).
+        n_threads: Threads, if there are enough particles for them.
+        least: How many new particles a thread draws at least.
+    """
+    n, upper_edges = len(particles.log_weights), _upper_edges(particles.weights)
+    states = np.empty_like(particles.states, order="C")
+
+    def draw(outputs: slice) -> None:
+        ancestors = _ancestors(upper_edges, outputs, n, offset)
+        # the ancestors are particles: nothing is clipped, but checked in another way, with a copy
+        particles.states.take(ancestors, axis=0, out=states[outputs], mode="clip")
+
+    in_shares(draw, n, n_threads, least)
+    return Particles(states, uniform_log_weights(n))

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from nodes.filtering.appearance import Appearance
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.motion import MotionModel, predict
-from nodes.filtering.observation import ObservationModel, Picture
 from nodes.filtering.particles import (
     Particles,
     effective_sample_size,
     resample_if_degenerate,
     reweight,
 )
+from nodes.vision.appearance import Appearance
+from nodes.vision.observation import ObservationModel, Picture
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +46,7 @@ def sir_step(
     motion: MotionModel,
     ess_threshold: float,
     rng: np.random.Generator,
+    n_threads: int = 1,
 ) -> tuple[Particles, SirInfo]:
     """One frame of the filter.
 
@@ -55,6 +56,7 @@ def sir_step(
         motion: The state model.
         ess_threshold: Fraction of n below which the particles are resampled.
         rng: The filter's own stream.
+        n_threads: Threads that resample.
 
     Returns:
         The posterior, and its moments before the resampling.
@@ -69,7 +71,7 @@ def sir_step(
         effective_sample_size(posterior),
     )
     # resample
-    return resample_if_degenerate(posterior, ess_threshold, rng), info
+    return resample_if_degenerate(posterior, ess_threshold, rng, n_threads), info
 
 
 def sum_log_likelihoods(

@@ -13,8 +13,6 @@ from jaxtyping import Float, Int, Integer
 
 from nodes.counting.grid import rows_of_parts, sample_positions
 from nodes.counting.histogram import SamplingOptions
-from nodes.filtering.color import ColorOptions
-from nodes.filtering.pattern import Pattern
 from nodes.simd.array import ProcessorArray
 from nodes.simd.cost import Cost
 from nodes.simd.memory import Word
@@ -34,6 +32,8 @@ from nodes.simd.programs.boxes import (
     words_for_distance,
 )
 from nodes.simd.report import FrameReport, Step
+from nodes.vision.color import ColorOptions
+from nodes.vision.pattern import Pattern
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +43,7 @@ class Measurement:
     Attributes:
         counts: Of each colour that is told apart, equal to those of `nodes.counting.histogram.count`.
         pixels: Samples in the picture, of each part.
-        squared_distance: d² to the reference, as `nodes.filtering.pattern.squared_distances` has it up to the
+        squared_distance: d² to the reference, as `nodes.vision.pattern.squared_distances` has it up to the
             arithmetic.
     """
 

@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 from rich.logging import RichHandler
 
+from sim.commands.bench import bench
 from sim.commands.clip import clip
 from sim.commands.compare import compare
 from sim.commands.consensus import consensus
@@ -15,8 +16,10 @@ from sim.commands.guard import guarded
 from sim.commands.inspect import check, footage, schema
 from sim.commands.node import central, node
 from sim.commands.replay import replay
+from sim.commands.report import report
 from sim.commands.run import run
 from sim.commands.simd import simd
+from sim.commands.simulate import simulate
 from sim.commands.watch import watch
 
 app = typer.Typer(
@@ -27,8 +30,12 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (run, watch, replay, compare, consensus, clip, simd, node, central, check, schema, footage):
+for command in (
+    *(run, watch, replay, compare, consensus, report, simulate, clip, simd),
+    *(node, central, check, schema, footage),
+):
     app.command()(guarded(command))
+app.add_typer(bench)
 
 
 def main() -> NoReturn:

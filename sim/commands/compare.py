@@ -2,7 +2,8 @@
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
 from itertools import groupby
@@ -13,7 +14,14 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from sim.commands.shared import AsJson, Frames, Overrides, length_text, progress_bar, split_overrides
+from sim.commands.shared import (
+    AsJson,
+    Frames,
+    Overrides,
+    length_text,
+    progress_bar,
+    split_overrides,
+)
 from sim.experiments.found.claims import Verdict
 from sim.experiments.options import ExperimentOptions, StudyOptions, is_experiment
 from sim.experiments.plan import Plan, make_plan, plan_experiment
@@ -64,15 +72,20 @@ def compare(
     # What computes and draws takes its time to import; --help does not wait for it.
     import joblib
 
+    from sim.assembly import Assembly
     from sim.experiments.computing.engine import compute_here, compute_on_cluster
     from sim.experiments.computing.store import Store
     from sim.experiments.found.claims import judge
     from sim.experiments.found.reporting import report, write_files
-    from sim.experiments.run import run_experiment
+    from sim.experiments.run import compute_missing, findings_of
     from sim.pictures.experiment import write_figures
+    from sim.report.experiment import experiment_report
+    from sim.report.page import FILE, write_page
 
     given = [*split_overrides(overrides), *([("frames", str(frames))] if frames else [])]
     plan = _plan(scenarios, sweeps or [], given, runs)
+    for group in plan.groups:
+        Assembly(group.scenario_run).require_backend()
     results = out or Path("runs") / f"{plan.options.name}-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
     store = Store(results / "parts")
     engine = (
@@ -80,20 +93,34 @@ def compare(
         if cluster
         else partial(compute_here, n_jobs=jobs or joblib.cpu_count())
     )
-    findings = run_experiment(plan, store, engine, partial(progress_bar, "parts of runs"))
-    verdicts = judge(findings)
-    found = report(findings, verdicts)
+    done: dict[str, Mapping[str, Any]] = {}
     try:
+        compute_missing(plan, store, engine, done, partial(progress_bar, "parts of runs"))
+    finally:
+        # However it ends, the page shows what is there.
+        findings = findings_of(plan, done)
+        verdicts = judge(findings)
+        if findings.groups:
+            with _writing(results):
+                write_page(experiment_report(findings, verdicts), results / FILE)
+    found = report(findings, verdicts)
+    with _writing(results):
         write_files(findings, found, verdicts, results)
         write_figures(findings, results)
-    except OSError as error:
-        raise RecordingError(
-            f"{results}: cannot be written: {error.strerror}: free space, or name another --out"
-        ) from error
     if as_json:
         sys.stdout.write(json.dumps(found) + "\n")
     else:
         _print({label: each for label, each in found.items() if label != "claims"}, verdicts, results)
+
+
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise RecordingError(
+            f"{folder}: cannot be written: {error.strerror}: free space, or name another --out"
+        ) from error
 
 
 def _plan(paths: list[Path], sweeps: list[str], given: list[tuple[str, str]], runs: int | None) -> Plan:
@@ -129,7 +156,7 @@ def _print(found: dict[str, Any], verdicts: Sequence[Verdict], folder: Path) -> 
         console.print(
             f"{verdict.study}, {verdict.label}, {verdict.claim}: {holds}: {verdict.text}", soft_wrap=True
         )
-    console.print(f"figures and plots in {folder}", soft_wrap=True)
+    console.print(f"figures, plots and report.html in {folder}", soft_wrap=True)
 
 
 def _print_table(console: Console, keys: tuple[str, ...], rows: dict[str, Any]) -> None:

@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 
 from network.errors import NetworkError
+from nodes.counting.build import KernelError
 from nodes.sources import SourceError
 from sim.experiments.computing.errors import EngineError
 from sim.footage import FootageError
@@ -17,7 +18,10 @@ from sim.running.children import RunFailed
 from sim.running.recorder import RecordingError
 from sim.scenario.parsing import ScenarioError
 
-USERS_ERRORS = (ScenarioError, NetworkError, SourceError, FootageError, RecordingError, EngineError)
+USERS_ERRORS = (
+    *(ScenarioError, NetworkError, SourceError, FootageError, RecordingError, EngineError),
+    KernelError,
+)
 """What the user can put right: exit code 2."""
 
 

@@ -28,6 +28,7 @@ from sim.commands.shared import (
     yes_no,
 )
 from sim.running.in_process import run_in_process
+from sim.running.provenance import sent_per_frame, versions
 from sim.running.recorder import Film, Recorder, default_folder
 from sim.running.results import Results, length, summarize
 from sim.scenario.model import Scenario
@@ -97,7 +98,7 @@ def run(
             launch = Launch(assembly, recorder, bar, by_hand or [], BEGAN_S, audience=audience)
             results, dead = launch.run(), launch.dead
         summary = summarize(results, processes=1 if in_process else chosen.n_processes)
-        summary["died"] = dead
+        summary |= {"died": dead, "sent_per_frame": sent_per_frame(results), "versions": versions()}
         if in_process:
             # The launcher has heard them come and go; here, the cameras' word for it must do.
             for event in summary["members"]["events"]:

@@ -9,6 +9,9 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from nodes.setup import FilterOptions
+from nodes.threads import n_shares
+from nodes.vision.observation import LEAST_BOXES
 from sim.scenario.advice import advice
 from sim.scenario.loading import load_scenario
 from sim.scenario.model import Scenario
@@ -38,15 +41,42 @@ def read_scenario(
     frames: int | None = None,
     pace: str | None = None,
     name: str | None = None,
+    rendered: bool = True,
 ) -> Scenario:
     """A scenario with what the command line says instead.
 
     Raises:
         ScenarioError: The file or an override is not as it must be.
+        KernelError: It wants the compiled kernel, and this machine cannot have it.
     """
     given = {"seed": seed, "frames": frames, "pace": pace, "name": name}
     chosen = [(key, str(value)) for key, value in given.items() if value is not None]
-    return load_scenario(path, [*split_overrides(overrides), *chosen])
+    scenario = load_scenario(path, [*split_overrides(overrides), *chosen], rendered=rendered)
+    if rendered:
+        _require_backend(scenario)
+        _say_of_threads(scenario.filter)
+    return scenario
+
+
+def _require_backend(scenario: Scenario) -> None:
+    """Fails before anything starts where this machine, or the emulated one, cannot run the filter."""
+    if scenario.filter.backend != "fast":
+        from sim.assembly import Assembly
+
+        Assembly(scenario).require_backend()
+
+
+def _say_of_threads(options: FilterOptions) -> None:
+    """Says on stderr where threads would lose, and are not used."""
+    n, wanted = options.n_particles, options.threads
+    used = n_shares(n, wanted, LEAST_BOXES)
+    if used < wanted:
+        Console(stderr=True).print(
+            f"filter.threads is {wanted}, and {used} will be used: fewer than {LEAST_BOXES:,} particles"
+            f" a thread would lose time, and there are {n:,}",
+            highlight=False,
+            soft_wrap=True,
+        )
 
 
 def split_overrides(overrides: list[str] | None) -> list[tuple[str, str]]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import AbstractContextManager, closing, contextmanager
+from dataclasses import replace
 from typing import Any
 
 from sim.experiments.computing.engine import Result
@@ -19,24 +20,25 @@ def _without_progress(_total: int) -> Iterator[Callable[[int], None]]:
     yield lambda _done: None
 
 
-def run_experiment(
-    plan: Plan, store: Store, engine: Engine, progress: ProgressBar = _without_progress
-) -> Findings:
-    """Runs an experiment.
+def compute_missing(
+    plan: Plan,
+    store: Store,
+    engine: Engine,
+    results: dict[str, Mapping[str, Any]],
+    progress: ProgressBar = _without_progress,
+) -> None:
+    """Reads what is on disk and computes the rest; however it ends, what is finished is in the results.
 
     Args:
         plan: The experiment.
         store: Where finished parts are kept.
         engine: Computes parts, in any order.
+        results: Takes each part's result, by its key.
         progress: Makes a bar for so many parts; it is told how many are done.
-
-    Returns:
-        What was found; it does not depend on the engine, nor on what was on disk already.
 
     Raises:
         RecordingError: The disk is full.
     """
-    results: dict[str, Mapping[str, Any]] = {}
     missing: list[Part] = []
     for part in plan.parts():
         found = store.read(part.key)
@@ -50,8 +52,21 @@ def run_experiment(
                 store.write(part.key, result)
                 results[part.key] = result
                 bar(count)
-    groups = [
-        GroupFindings(group, [{kind: results[part.key] for kind, part in run.items()} for run in group.parts])
-        for group in plan.groups
-    ]
-    return Findings(plan.options, tuple(groups))
+
+
+def findings_of(plan: Plan, results: Mapping[str, Mapping[str, Any]]) -> Findings:
+    """What the runs have found of which every part is there."""
+    groups: list[GroupFindings] = []
+    missing: dict[str, int] = {}
+    for group in plan.groups:
+        runs = [
+            (seed, parts)
+            for seed, parts in zip(group.seeds, group.parts, strict=True)
+            if all(part.key in results for part in parts.values())
+        ]
+        missing[group.study] = missing.get(group.study, 0) + len(group.parts) - len(runs)
+        if runs:
+            seeds, parts = zip(*runs, strict=True)
+            each = [{kind: results[part.key] for kind, part in run.items()} for run in parts]
+            groups.append(GroupFindings(replace(group, seeds=seeds, parts=parts), each))
+    return Findings(plan.options, tuple(groups), missing)

@@ -30,17 +30,17 @@ def write_figures(findings: Findings, folder: Path) -> None:
     Raises:
         OSError: They cannot be written.
     """
-    for name, study in findings.options.studies.items():
-        write_figure(
-            _strips(findings, name) if study.plot == "strips" else plot_study(findings, name), folder / name
-        )
+    for name in findings.options.studies:
+        write_figure(plot_study(findings, name), folder / name)
     if findings.options.page:
         for preset in _presets(findings, findings.options.page):
             write_figure(plot_page(findings, preset), folder / f"{findings.options.name}-{preset}")
 
 
 def plot_study(findings: Findings, name: str) -> Figure:
-    """The figure of a study: a column a scenario, a row a preset."""
+    """The figure of a study: a column a scenario, a row a preset; of strips, a scenario beside the other."""
+    if findings.options.studies[name].plot == "strips":
+        return _strips(findings, name)
     presets = _presets(findings, [name])
     rows = [
         [

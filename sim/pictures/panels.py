@@ -51,14 +51,17 @@ def draw_error(axes: Axes, groups: Sequence[GroupFindings]) -> None:
     )
     for dash, combination in zip(_DASHES * len(combinations), combinations, strict=False):
         line = [g for g in groups if tuple(g.settings[name] for name in others) == combination]
+        if not line:  # an interrupted experiment has not come to it
+            continue
+        x = numbers[[values.index(group.settings[key]) for group in line]]
         label = "".join(
             f", {_short(name)} = {value}" for name, value in zip(others, combination, strict=True)
         )
-        _draw_cameras(axes, numbers, line)
+        _draw_cameras(axes, x, line)
         for track in ("single", "cpf", "dcpf"):
             if line[0].has(track):
                 intervals = [mean_interval(group.rmse(track)) for group in line]
-                _draw_line(axes, numbers, intervals, _TINTS[track], _NAMES[track] + label, dash)
+                _draw_line(axes, x, intervals, _TINTS[track], _NAMES[track] + label, dash)
     if not is_number or len(values) <= _MOST_TICKS:
         axes.set_xticks(numbers, values)
     if not is_number:

@@ -9,7 +9,6 @@ import matplotlib as mpl
 import numpy as np
 from jaxtyping import Float, Int
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.ticker import LogLocator, NullLocator
@@ -19,7 +18,7 @@ from sim.pictures.ground import Area, area_of, coverage, heading, height_of_targ
 from sim.pictures.theme import COLORS, FAINT, INK, LABELS, MUTED, SEEN
 from sim.running.results import Results
 
-_GRID_CELLS = 600  # along the longer side of the ground, for who sees what
+_GRID_CELLS = 300  # along the longer side of the ground, for who sees what
 
 
 def plot_errors(results: Results) -> Figure:
@@ -75,13 +74,13 @@ def plot_trajectories(results: Results, assembly: Assembly) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
     rows = figure.add_gridspec(2, 1, height_ratios=[3, 1]) if is_volume else figure.add_gridspec(1, 1)
     axes = cleaned(figure.add_subplot(rows[0]))
-    _draw_ground(axes, results, assembly, area)
-    _draw_paths(axes, results)
+    draw_ground(axes, results, assembly, area)
+    draw_paths(axes, results)
     axes.set(xlabel="x / m", ylabel="y / m", title=results.scenario.name, aspect="equal")
     axes.set(xlim=(area.low[0], area.high[0]), ylim=(area.low[1], area.high[1]))
     if is_volume:
         below = cleaned(figure.add_subplot(rows[1]))
-        _draw_heights(below, results)
+        draw_heights(below, results)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
     return figure
 
@@ -125,20 +124,19 @@ def _errors(results: Results, estimator: str) -> Float[np.ndarray, "C T"]:
 
 def _draw_nodes(axes: Axes, frames: Int[np.ndarray, " T"], errors: Float[np.ndarray, "C T"]) -> None:
     """The median of DCPF's nodes, and the band that holds them all."""
-    label, color = f"{LABELS['dcpf']}: median of the nodes, and range", COLORS["dcpf"]
+    label, color = f"{LABELS['dcpf']}: nodes' median and range", COLORS["dcpf"]
     axes.plot(frames, np.nanmedian(errors, axis=0), color=color, linewidth=1.8, label=label)
     low, high = np.nanmin(errors, axis=0), np.nanmax(errors, axis=0)
     axes.fill_between(frames, low, high, color=color, alpha=0.25, linewidth=0)
 
 
-def _draw_ground(axes: Axes, results: Results, assembly: Assembly, area: Area) -> None:
+def draw_ground(axes: Axes, results: Results, assembly: Assembly, area: Area) -> None:
+    """The ground from above: shaded by how many cameras see it, with occluders, cameras and their graph."""
     step = float(area.size.max()) / _GRID_CELLS
     x, y = (np.arange(low, high, step) for low, high in zip(area.low, area.high, strict=True))
     seen = coverage(assembly.cameras.values(), x, y, height_of_target(results, assembly))
-    colors = BoundaryNorm(np.arange(len(SEEN) + 1) - 0.5, len(SEEN))
-    axes.pcolormesh(
-        x, y, np.minimum(seen, len(SEEN) - 1), cmap=ListedColormap(list(SEEN)), norm=colors, rasterized=True
-    )
+    levels = np.arange(len(SEEN) + 1) - 0.5
+    axes.contourf(x, y, np.minimum(seen, len(SEEN) - 1), levels, colors=list(SEEN))
     for occluder in assembly.world.occluders if assembly.world else ():
         axes.add_patch(Polygon(occluder.footprint, color=MUTED))
     for a, b in sorted(assembly.graph.edges):
@@ -155,7 +153,8 @@ def _draw_ground(axes: Axes, results: Results, assembly: Assembly, area: Area) -
         )  # fmt: skip
 
 
-def _draw_paths(axes: Axes, results: Results) -> None:
+def draw_paths(axes: Axes, results: Results) -> None:
+    """Where the estimators had the target, and where it was."""
     truth = results.true_states()
     if truth is not None:
         axes.plot(*truth[:, :2].T, color=COLORS["truth"], linewidth=3.2, alpha=0.35, label=LABELS["truth"])
@@ -167,11 +166,13 @@ def _draw_paths(axes: Axes, results: Results) -> None:
             )
 
 
-def _draw_heights(axes: Axes, results: Results) -> None:
+def draw_heights(axes: Axes, results: Results) -> None:
+    """The height of the target in a volume, frame by frame."""
     truth = results.true_states()
     if truth is not None:
-        axes.plot(truth[:, 2], color=COLORS["truth"], linewidth=3.2, alpha=0.35)
+        axes.plot(truth[:, 2], color=COLORS["truth"], linewidth=3.2, alpha=0.35, label=LABELS["truth"])
     for kind, width in (("cpf", 1.6), ("dcpf", 0.9)):
-        for track in results.of(kind).values():
-            axes.plot(results.means(track)[:, 2], color=COLORS[kind], linewidth=width)
+        for index, track in enumerate(results.of(kind).values()):
+            label = LABELS[kind] if index == 0 else None
+            axes.plot(results.means(track)[:, 2], color=COLORS[kind], linewidth=width, label=label)
     axes.set(xlabel="frame", ylabel="z / m", xlim=(0, results.scenario.frames - 1))

@@ -25,7 +25,7 @@ from mcap_protobuf.schema import register_schema
 
 from network import codec, keys
 from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
-from nodes.filtering.target import project_boxes
+from nodes.vision.target import project_boxes
 from sim.assembly import Assembly
 from sim.pictures.theme import COLORS, PAPER, PARTICLE
 from sim.recording import foxglove, scene

@@ -21,7 +21,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from jaxtyping import Float
 
 from network.messages import EstimateMessage, TruthMessage
-from nodes.filtering.target import TargetOptions
+from nodes.vision.target import TargetOptions
 from sim.assembly import Assembly
 from sim.pictures.ground import ellipse, field_of_view
 from sim.pictures.theme import COLORS, FAINT, MUTED, PAPER

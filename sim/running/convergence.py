@@ -16,7 +16,6 @@ from jaxtyping import Float
 from pydantic import TypeAdapter
 
 from network.averaging import matrices
-from network.averaging.finite_time import leja_order
 from network.consensus import Consensus
 from network.graph import Graph
 from network.memory import MemoryNetwork
@@ -156,28 +155,23 @@ def _theory(
     options: ConsensusOptions, graph: Graph, spectrum: Spectrum, rounds: int
 ) -> tuple[float, Float[np.ndarray, " T"] | None]:
     """The rate, and the residual after each round, from the algorithm's matrices."""
-    start, L = np.eye(len(graph.names)), matrices.laplacian(graph)
-    metropolis = matrices.metropolis_laplacian(graph)
+    L = matrices.laplacian(graph)
     match options.algorithm:
         case "constant":
-            rate, values = (
-                matrices.linear_rate(L, options.epsilon),
-                matrices.linear(L, start, options.epsilon),
-            )
-        case "metropolis":
-            rate, values = matrices.linear_rate(metropolis), matrices.linear(metropolis, start)
+            rate = matrices.linear_rate(L, options.epsilon)
+        case "metropolis" | "event_triggered":
+            rate = matrices.linear_rate(matrices.metropolis_laplacian(graph))
         case "best_constant":
-            rate, values = spectrum.contraction, matrices.linear(L, start, spectrum.step)
+            rate = spectrum.contraction
         case "chebyshev":
-            rate, values = matrices.chebyshev_rate(spectrum), matrices.chebyshev(L, start, spectrum)
+            rate = matrices.chebyshev_rate(spectrum)
         case "finite_time":
-            roots = leja_order(np.array(spectrum.eigenvalues))
-            rate, values = 0.0, matrices.finite_time(L, start, roots)
+            rate = 0.0
         case "ratio":
-            rate, values = matrices.ratio_rate(L), matrices.ratio(L, start)
-        case "event_triggered":
-            # as Metropolis, down to the threshold's floor
-            return matrices.linear_rate(metropolis), None
+            rate = matrices.ratio_rate(L)
+    if options.algorithm == "event_triggered":
+        return rate, None  # as Metropolis, down to the threshold's floor
+    values = matrices.rounds(options, graph)(np.eye(len(graph.names)))
     return rate, np.array([matrices.worst_residual(each) for each in islice(values, 1, rounds + 1)])
 
 

@@ -120,8 +120,12 @@ class InProcess:
             if absence.begin == frame:
                 self._leave(absence)
             elif absence.end == frame:
+                # its first message is there before the others begin the frame
                 self._return(absence)
-        for name in self._images.keys() - self._away - self._slow.keys():
+                yield from self._open(absence.node, frame)
+                yield from self._deliver()
+        back = {absence.node for absence in self._absences if absence.end == frame}
+        for name in self._images.keys() - self._away - back - self._slow.keys():
             late_ns = round(NS * slowness_s(self._assembly.scenario.faults, name, frame))
             self._slow[name] = (self._now_ns + late_ns, frame)
         yield from self._take_pictures()
@@ -132,16 +136,20 @@ class InProcess:
             if due_ns > self._now_ns:
                 continue
             del self._slow[name]
-            image = self._images[name]
-            if self._central is not None:
-                self._network.post(name, PixelsMessage(name, frame, image), self._now_ns)
-            camera = self._cameras.get(name)
-            if camera is None:
-                continue
-            began = time.perf_counter()
-            outgoing = camera.on_frame(frame, image)
-            self._telemetry[name].local_filter_s.append(time.perf_counter() - began)
-            yield from self._speak(name, outgoing)
+            yield from self._open(name, frame)
+
+    def _open(self, name: str, frame: int) -> Iterator[EstimateMessage]:
+        """A camera's picture is there: its local filter, and its first message."""
+        image = self._images[name]
+        if self._central is not None:
+            self._network.post(name, PixelsMessage(name, frame, image), self._now_ns)
+        camera = self._cameras.get(name)
+        if camera is None:
+            return
+        began = time.perf_counter()
+        outgoing = camera.on_frame(frame, image)
+        self._telemetry[name].local_filter_s.append(time.perf_counter() - began)
+        yield from self._speak(name, outgoing)
 
     def _leave(self, absence: Absence) -> None:
         """A node is killed, which its neighbours see at once, or hangs, which they see after a lease."""

@@ -74,7 +74,6 @@ class Launch:
         self._frames_done = 0
         self._orders = Orders(assembly.scenario.faults)
         self._killed: set[str] = set()  # by the scenario's faults, and not started again
-        self._start_order = ControlMessage("start")
 
     def run(self) -> Results:
         """Runs it all.
@@ -96,8 +95,8 @@ class Launch:
             children = stack.enter_context(
                 Children(recorded / "scenario.yaml", recorded / "logs", folder, self._by_hand)
             )
-            router = run_endpoints(self._assembly.scenario, folder, []).router
-            session = sessions.open_client(router, timeout_s=None)
+            endpoints = run_endpoints(self._assembly.scenario, folder, [])
+            session = sessions.open_client(endpoints.router, timeout_s=None)
             stack.callback(sessions.close, session)
             # However it ends, nodes that somebody else has started shall know.
             stack.callback(publish, session, self._assembly.scenario.name, ControlMessage("stop"))
@@ -153,10 +152,9 @@ class Launch:
         publish(session, self._assembly.scenario.name, self._start_order)
 
     def _order(self, children: Children, what: str, whom: str) -> None:
-        """Orders what the scenario's faults ask for."""
         self._recorder.event(what, whom, frame=self._frames_done)
         self._absent_since.pop(whom, None)
-        self._killed.discard(whom)
+        self._killed -= {whom}
         children.do(what, whom)
 
     def _messages(self, children: Children) -> Iterator[Heard | None]:
@@ -180,7 +178,7 @@ class Launch:
             working.difference_update(self.dead)
 
     def _settle(self, children: Children, working: set[str], ended: dict[str, int]) -> set[str]:
-        """What is to be said of those whose processes have ended; returns who will not come back."""
+        """Tells of those whose processes have ended; returns who will not come back."""
         settled = set()
         for name in sorted(working & ended.keys()):
             absence = self._orders.killed(name, ended[name])
@@ -194,12 +192,12 @@ class Launch:
             if absence.end is None:
                 self._recorder.forget(name)
                 settled.add(name)
-        # the others are done: nobody waits for the end of the faults any more
-        if all(map(self._orders.excuses, working - settled)):
-            for what, whom in self._orders.close():
-                self._order(children, what, whom)
-            settled |= self._killed
-        return settled
+        if not all(map(self._orders.excuses, working - settled)):
+            return settled
+        # the others are done: no fault's end is waited for
+        for what, whom in self._orders.close():
+            self._order(children, what, whom)
+        return settled | self._killed
 
     def _stuck(self, working: set[str]) -> set[str]:
         """Nodes that are there but have told nothing since everybody was waited for: spinning, or hung."""
@@ -255,8 +253,7 @@ class Launch:
             return
         self.results.add(message)
         self._recorder.add(message)
-        if isinstance(message, StatusMessage) and message.state == "ready":
-            # it comes when the others have begun
+        if isinstance(message, StatusMessage) and message.state == "ready":  # the others have begun
             publish(session, self._assembly.scenario.name, self._start_order)
         if isinstance(message, EstimateMessage) and message.frame >= self._frames_done:
             self._frames_done = message.frame + 1

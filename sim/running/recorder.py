@@ -218,6 +218,22 @@ def read_run(folder: Path) -> Results:
     return results
 
 
+def read_summary(folder: Path) -> dict[str, Any] | None:
+    """The summary of a run; None if it was not finished.
+
+    Raises:
+        RecordingError: It is damaged.
+    """
+    path = folder / "summary.json"
+    if not path.is_file():
+        return None
+    try:
+        summary: dict[str, Any] = json.loads(path.read_bytes())
+    except ValueError as error:
+        raise RecordingError(f"{path}: is no summary of a run: take it away, or run again") from error
+    return summary
+
+
 def _lines(path: Path) -> list[bytes]:
     return path.read_bytes().splitlines() if path.is_file() else []
 

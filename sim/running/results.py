@@ -1,5 +1,6 @@
 """What a run has found, collected estimate by estimate, and its summary."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -231,6 +232,14 @@ def _tracking(results: Results, tracks: list[Track]) -> dict[str, float | None] 
         "losses_per_node": len(each) / len(known),
         "reacquired_after_s": float(np.mean(found_after)) / results.scenario.rate_hz if found_after else None,
     }
+
+
+def counted(status: StatusMessage, group: str) -> Counter[str]:
+    """What a node has counted of a group, such as `bytes`, by kind."""
+    found = status.counters.get(group)
+    return Counter(
+        {kind: int(number) for kind, number in (found if isinstance(found, Mapping) else {}).items()}
+    )
 
 
 def _fusion(results: Results) -> dict[str, Any]:

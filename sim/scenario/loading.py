@@ -10,21 +10,25 @@ from nodes.calibration import CalibrationError, checked_camera, cropped, read_op
 from nodes.camera import Camera, look_at
 from nodes.sources import SourceError, VideoSource
 from sim.footage import FootageError, locate
+from sim.scenario.cameras import CameraOptions
 from sim.scenario.complaints import validate
 from sim.scenario.document import Document, merge_defaults, read_document
 from sim.scenario.edges import with_edges
-from sim.scenario.model import CameraOptions, Scenario
+from sim.scenario.model import Scenario
 from sim.scenario.parsing import ScenarioError
 from sim.scenario.presets import preset_defaults
 from sim.world.background import require_inside
 
 
-def load_scenario(path: Path, overrides: Iterable[tuple[str, str]] = ()) -> Scenario:
+def load_scenario(
+    path: Path, overrides: Iterable[tuple[str, str]] = (), *, rendered: bool = True
+) -> Scenario:
     """Reads a scenario file and resolves it.
 
     Args:
         path: The file.
         overrides: Dotted keys and values, as `--set` gives them; later ones win.
+        rendered: Whether its cameras will take pictures of its room, and so must hang in it.
 
     Returns:
         A scenario that does not depend on the presets, on the file's place or on other files' contents: its
@@ -33,10 +37,12 @@ def load_scenario(path: Path, overrides: Iterable[tuple[str, str]] = ()) -> Scen
     Raises:
         ScenarioError: The file, or one that it names, is not as it must be.
     """
-    return resolve(read_document(path), overrides)
+    return resolve(read_document(path), overrides, rendered=rendered)
 
 
-def resolve(document: Document, overrides: Iterable[tuple[str, str]] = ()) -> Scenario:
+def resolve(
+    document: Document, overrides: Iterable[tuple[str, str]] = (), *, rendered: bool = True
+) -> Scenario:
     """Resolves a scenario that has been read, as `load_scenario` does.
 
     Raises:
@@ -48,7 +54,7 @@ def resolve(document: Document, overrides: Iterable[tuple[str, str]] = ()) -> Sc
     document = merge_defaults(document, preset_defaults(document.data))
     scenario = validate(document, Scenario)
     try:
-        resolved = _resolve(scenario, path.parent)
+        resolved = _resolve(scenario, path.parent, rendered=rendered)
         return with_edges(resolved, cameras_of(resolved), path.parent)
     except (CalibrationError, FootageError, SourceError) as error:
         raise ScenarioError(f"{path}: {error}") from None
@@ -75,11 +81,11 @@ def video_source(scenario: Scenario, camera: str) -> VideoSource:
     return VideoSource(Path(str(options.video)), scenario.footage.scale, scenario.footage.first_frame)
 
 
-def _resolve(scenario: Scenario, folder: Path) -> Scenario:
+def _resolve(scenario: Scenario, folder: Path, *, rendered: bool) -> Scenario:
     footage = scenario.footage
     if footage is None:
         cameras = {each.name: _calibrated(each, folder, {}) for each in scenario.cameras}
-        if scenario.world is not None:
+        if scenario.world is not None and rendered:
             for camera in cameras.values():
                 require_inside(camera, scenario.world.room)
         return scenario.model_copy(update={"cameras": tuple(map(_as_options, cameras.values()))})

@@ -1,74 +1,26 @@
 """The scenario: what a file can say. It composes the options that stand beside the things they configure."""
 
+from collections import Counter
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, Field, PositiveInt, model_validator
+from pydantic import Field, model_validator
 
 from network.conditions import ConditionsOptions
 from network.graph import Edge, Graph, complete, grid, path, ring, star
-from network.keys import check_name
 from network.options import Options
 from network.quantization import PayloadOptions
 from network.weights import ConsensusOptions
 from nodes.filtering.fusion import FusionOptions
-from nodes.filtering.target import TargetOptions
 from nodes.pace import lag_for
 from nodes.setup import FilterOptions
+from nodes.vision.target import TargetOptions
 from sim.faults.options import FaultOptions, require_possible
+from sim.scenario.cameras import Cameras, Name
 from sim.scenario.graphs import DescribedGraph
 from sim.scenario.presets import PresetName
+from sim.simulation.sensor import SensorOptions
 from sim.world.world import WorldOptions
-
-Name = Annotated[str, AfterValidator(check_name)]
-Vector3 = tuple[float, float, float]
-
-
-class CameraOptions(Options):
-    """A calibrated camera: by position and look-at point, by K, R and t, or by a calibration file."""
-
-    name: Name
-    """Name of the camera and of its node."""
-    size_px: tuple[PositiveInt, PositiveInt] | None = None
-    """Width and height of its pictures."""
-    position: Vector3 | None = None
-    """Its centre, in m, with `look_at` and `focal_px`."""
-    look_at: Vector3 | None = None
-    """A point on its optical axis, in m; the camera stands level."""
-    focal_px: float | None = Field(default=None, gt=0)
-    """Focal length."""
-    K: tuple[Vector3, Vector3, Vector3] | None = None
-    """Intrinsic matrix, in pixels, with `R` and `t`."""
-    R: tuple[Vector3, Vector3, Vector3] | None = None
-    """Rotation from world axes to the camera's (x right, y down, z forward)."""
-    t: Vector3 | None = None
-    """Translation, in m; the camera's centre is -Rᵀt."""
-    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
-    """k1, k2, p1, p2, k3 of the lens, in OpenCV's order."""
-    calibration: str | None = None
-    """A calibration file instead: OpenCV's YAML, XML or JSON, or Qualisys' `.qca.txt` (by serial = name)."""
-    video: str | None = None
-    """The camera's video, for footage: a path, relative to the footage's folder."""
-    video_sha256: str | None = None
-    """What the video must hash to; written into the folder of a run."""
-
-    @model_validator(mode="after")
-    def _one_way(self) -> "CameraOptions":
-        looks = [self.position, self.look_at, self.focal_px]
-        matrices = [self.K, self.R, self.t]
-        ways = [any(v is not None for v in way) for way in (looks, matrices)] + [self.calibration is not None]
-        if sum(ways) > 1:
-            raise ValueError(
-                f"camera {self.name} is calibrated in two ways: keep position, look_at and focal_px, or K, R"
-                " and t, or calibration"
-            )
-        if ways[0] and None in looks:
-            raise ValueError(f"camera {self.name} needs position, look_at and focal_px: add what lacks")
-        if ways[1] and None in matrices:
-            raise ValueError(f"camera {self.name} needs K, R and t together: add what lacks")
-        if (ways[0] or ways[1]) and self.size_px is None:
-            raise ValueError(f"camera {self.name} needs size_px: add it, such as size_px: [640, 480]")
-        return self
 
 
 class FootageOptions(Options):
@@ -166,8 +118,8 @@ class Scenario(Options):
     """the recorded one."""
     target: TargetOptions
     """What is tracked."""
-    cameras: tuple[CameraOptions, ...] = Field(min_length=1)
-    """The smart cameras, in the order of the graph."""
+    cameras: Cameras
+    """The smart cameras, in the order of the graph: a list, or a `layout` of as many as one likes."""
     network: NetworkOptions
     """Who talks to whom."""
     filter: FilterOptions = FilterOptions()
@@ -180,6 +132,8 @@ class Scenario(Options):
     """What DCPF is compared with."""
     faults: tuple[FaultOptions, ...] = ()
     """What goes wrong, each by its `kind`, `frame` and, but for the router, `node`."""
+    sensor: SensorOptions = SensorOptions()
+    """What `dcpf simulate` puts in the place of pictures."""
 
     @model_validator(mode="after")
     def _world_or_footage(self) -> "Scenario":
@@ -190,8 +144,8 @@ class Scenario(Options):
     @model_validator(mode="after")
     def _names(self) -> "Scenario":
         names = [camera.name for camera in self.cameras]
-        for name in names:
-            if names.count(name) > 1:
+        for name, count in Counter(names).items():
+            if count > 1:
                 raise ValueError(f"cameras has two named {name}: give each its own name")
         if self.central.name in names:
             raise ValueError(f"central.name is {self.central.name}, as is a camera: give it another name")

@@ -101,3 +101,11 @@ def test_parts_are_named():
 def test_unknown_node_is_named():
     with pytest.raises(ValueError, match="Z is no node of the graph; nodes: A, B"):
         graph.path(["A", "B"]).neighbors("Z")
+
+
+def test_of_many_parts_the_first_are_named():
+    names = [f"{i:03}" for i in range(300)]
+    net = Graph(tuple(names), graph.path(names[:100]).edges)
+    with pytest.raises(ValueError, match=r"falls into 201 parts, 000, 001, .*, 011, 88 more") as wrong:
+        net.require_connected()
+    assert "| 189 more: add edges that join them" in str(wrong.value)

@@ -7,7 +7,7 @@ import pytest
 from network import graph
 from network.averaging.finite_time import leja_order
 from network.graph import Graph
-from network.spectrum import spectrum_of
+from network.spectrum import LARGEST_DENSE, extremes_of, spectrum_of
 
 NAMES = tuple(f"{i:02}" for i in range(12))
 
@@ -54,3 +54,23 @@ def test_leja_order_takes_the_farthest_next():
         left = [point for point in many if point not in chosen]
         chosen.append(max(left, key=lambda point: np.prod(np.abs(point - np.array(chosen)))))
     np.testing.assert_array_equal(leja_order(many), chosen[1:])
+
+
+def test_the_ends_of_a_large_grid_are_the_closed_form():
+    n = 50
+    names = [f"{i:04}" for i in range(n * n)]
+    assert len(names) > LARGEST_DENSE
+    found = extremes_of(graph.grid(names))
+    largest = 4 - 4 * np.cos(np.pi * (n - 1) / n)
+    np.testing.assert_allclose(found.eigenvalues, [2 - 2 * np.cos(np.pi / n), largest], rtol=1e-9)
+    assert extremes_of(graph.grid(names)) == found
+
+
+def test_the_ends_of_a_small_graph_are_those_of_its_spectrum():
+    assert extremes_of(graph.ring(NAMES)) == spectrum_of(graph.ring(NAMES))
+
+
+def test_all_eigenvalues_of_a_large_graph_are_refused():
+    names = [f"{i:04}" for i in range(LARGEST_DENSE + 1)]
+    with pytest.raises(ValueError, match="choose an algorithm that needs two of them"):
+        spectrum_of(graph.path(names))

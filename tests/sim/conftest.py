@@ -1,5 +1,6 @@
-"""For the tests of whole runs: a small hall that is quick to render, and its scenario as a file."""
+"""For the tests of whole runs: a small hall, quick to render, its scenario as a file, and a browser."""
 
+import shutil
 import textwrap
 
 import pytest
@@ -35,6 +36,30 @@ SMALL = """
             - {time_s: 6.0, position: [0.0, 6.0]}
       room: {center: [0.0, 4.5], size: [20.0, 20.0], height: 5.0}
     """
+
+QUIET = (
+    *("headless=new", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-sync"),
+    *("disable-background-networking", "disable-component-update"),
+)
+"""How Chromium is started: without a window, and without a word to anybody."""
+
+
+@pytest.fixture
+def browser(tmp_path):
+    """A browser without a window, where Chromium is installed."""
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    chromedriver = shutil.which("chromedriver")
+    if not (chromium and chromedriver):
+        pytest.skip("needs Chromium: apt-get install chromium chromium-driver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for switch in (*QUIET, f"user-data-dir={tmp_path / 'browser'}"):
+        options.add_argument(f"--{switch}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(chromedriver))
+    yield driver
+    driver.quit()
 
 
 @pytest.fixture

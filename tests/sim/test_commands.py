@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from nodes.counting.build import load_kernel
 from sim.commands.app import app
 from sim.commands.inspect import scenario_schema
 from sim.running import listener
@@ -166,7 +167,7 @@ def test_compare_writes_figures_and_plots(dcpf, small, tmp_path):
     assert [each["seed"] for each in report["summaries"]] == [0, 1]
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         *("comparison.json", "comparison.svg", "comparison.png", "cells.jsonl", "summary.csv", "timing.json"),
-        "parts",
+        *("parts", "report.html"),
     }
 
 
@@ -215,6 +216,31 @@ def test_watch_goes_on_until_it_is_ended(dcpf, monkeypatch):
 
     assert result.exit_code == 130
     assert result.stderr == "dcpf: interrupted\n"
+
+
+def test_a_kernel_that_cannot_be_compiled_is_said_before_anything_starts(dcpf, small, tmp_path, monkeypatch):
+    monkeypatch.setenv("CC", "false")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "kernels"))
+    load_kernel.cache_clear()
+    for command in ("run", "check", "compare"):
+        result = dcpf(command, small, "--set", "filter.backend=compiled")
+        assert result.exit_code == 2
+        assert "false could not compile count.c" in result.stderr
+        assert "take filter.backend: fast" in result.stderr
+    assert not (tmp_path / "runs").exists()
+
+
+def test_threads_that_would_lose_are_said_not_to_be_used(dcpf, small):
+    result = dcpf("check", small, "--set", "filter.threads=4")
+    assert result.exit_code == 0
+    assert "filter.threads is 4, and 1 will be used: fewer than 8,000" in result.stderr
+    assert not dcpf("check", small).stderr
+
+
+def test_bench_names_the_scenario_that_is_not_there(dcpf, tmp_path):
+    result = dcpf("bench", "filter", "--scenarios", tmp_path)
+    assert result.exit_code == 2
+    assert "wica.yaml: there is no such file" in result.stderr
 
 
 @pytest.mark.usefixtures("small")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from network.messages import EstimateMessage, TruthMessage
 from nodes.camera import look_at
-from nodes.filtering.target import TargetOptions
+from nodes.vision.target import TargetOptions
 from sim.assembly import Assembly
 from sim.pictures import canvas, ground
 from sim.pictures.chart import Chart, Line, mean_known, round_numbers

@@ -11,10 +11,10 @@ from jaxtyping import Float, UInt8
 from pydantic import Field, model_validator
 
 from network.options import Options
-from nodes.filtering.hue import FULL_SATURATION, GREY_CHROMA, GREY_SATURATION
 from nodes.simd.array import ProcessorArray
 from nodes.simd.memory import ExternalMemory, Word
 from nodes.simd.programs.arithmetic import divide
+from nodes.vision.hue import FULL_SATURATION, GREY_CHROMA, GREY_SATURATION
 
 MAX_BINS = 512
 """The most bins of a histogram."""
@@ -76,7 +76,7 @@ def bin_picture(
 
 
 def hue_bins(array: ProcessorArray, red: Word, green: Word, blue: Word, options: BinningOptions) -> None:
-    """Puts the bin of the hue into red, by the rule of `nodes.filtering.hue.hue_bins`."""
+    """Puts the bin of the hue into red, by the rule of `nodes.vision.hue.hue_bins`."""
     value, spread = array.word(), array.word()
     dividend, divisor = array.word(n_words=2), array.word(n_words=2)
     with array.using(value, spread, dividend, divisor):

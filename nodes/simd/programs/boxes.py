@@ -1,7 +1,7 @@
 """Counting on a grid of samples in boxes of any size, and the distance to a reference, part by part.
 
 Source: Algorithm 2 of Medeiros et al. (2008) with the samples of `nodes.counting.grid`, and the distance of
-`nodes.filtering.pattern` computed recursively, as the paper's section 5 proposes: the coefficient grows by
+`nodes.vision.pattern` computed recursively, as the paper's section 5 proposes: the coefficient grows by
 one bin after the other, so that no histogram has to be kept. As many bins as there are free words are counted
 in one reading of the samples.
 """

@@ -23,7 +23,7 @@ Kind = Literal["cameras", "central", "coded"]
 
 _PACKAGES = ("network", "nodes", "sim")
 _SOURCES = {".py", ".c"}
-_NO_NUMBERS = ("sim/commands", "sim/pictures", "sim/experiments")
+_NO_NUMBERS = ("sim/commands", "sim/pictures", "sim/report", "sim/experiments")
 
 
 @dataclass(frozen=True, slots=True)

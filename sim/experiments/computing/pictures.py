@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from nodes.filtering.color import ColorOptions, quantize
 from nodes.sources import FrameSource
+from nodes.vision.color import ColorOptions, quantize
 from sim.assembly import Assembly
 
 Picture = UInt8[np.ndarray, "H W 3"]

@@ -35,9 +35,11 @@ class Verdict:
 
 
 def judge(findings: Findings) -> list[Verdict]:
-    """Every claim of an experiment, for each scenario and preset."""
+    """Every claim of an experiment, for each scenario and preset, of studies of which all runs are there."""
     verdicts = []
     for name, study in findings.options.studies.items():
+        if findings.missing[name]:
+            continue
         for label in findings.labels(name):
             groups = findings.study(name, label)
             for claim in study.claims:

@@ -130,10 +130,12 @@ class Findings:
     Attributes:
         options: The experiment.
         groups: What each group of runs has found, study by study.
+        missing: How many runs of each study are not there: it was interrupted, or they failed.
     """
 
     options: ExperimentOptions
     groups: tuple[GroupFindings, ...]
+    missing: Mapping[str, int]
 
     def study(self, name: str, label: str | None = None) -> list[GroupFindings]:
         """The groups of a study, of one scenario and preset if a label is given."""

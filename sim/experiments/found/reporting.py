@@ -56,7 +56,7 @@ def write_files(
     (folder / "comparison.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
     cells = [json.dumps(cell) + "\n" for each in findings.groups for cell in _cells(each)]
     (folder / "cells.jsonl").write_text("".join(cells), encoding="utf-8")
-    rows = [row for each in findings.groups for row in _rows(each)]
+    rows = [row for each in findings.groups for row in figure_rows(each)]
     with (folder / "summary.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)), restval="")
         writer.writeheader()
@@ -104,7 +104,7 @@ def _cells(each: GroupFindings) -> Iterator[dict[str, Any]]:
         }
 
 
-def _rows(each: GroupFindings) -> Iterator[dict[str, Any]]:
+def figure_rows(each: GroupFindings) -> Iterator[dict[str, Any]]:
     """One line of the CSV for each estimator of a group."""
     group, n_axes = each.group, each.group.scenario_run.target.n_axes
     sent, limit = each.bytes_per_frame(), Results(group.scenario_run).lost_error

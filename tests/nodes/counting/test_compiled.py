@@ -10,10 +10,12 @@ from nodes.counting.build import KernelError, load_kernel
 from nodes.counting.codebook import codebook
 from nodes.counting.compiled import compile_reference, counts_compiled, distances_compiled
 from nodes.counting.histogram import SamplingOptions, count
-from nodes.filtering.color import ColorOptions, coding, quantize
-from nodes.filtering.pattern import Pattern, coefficients, squared_distances
+from nodes.vision.color import ColorOptions, coding, quantize
+from nodes.vision.pattern import Pattern, coefficients, squared_distances
 
 HEIGHT, WIDTH = 30, 40
+BOX_COST_OF_NONE, BOX_COST_OF_ALL = 10**9, -(10**9)
+"""What a box costs directly: integral images are always less, or never."""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -26,11 +28,26 @@ def _kernel():
 
 @st.composite
 def boxes_of(draw):
-    """Boxes over the borders, empty ones, single pixels, the whole picture, and one that cannot be seen."""
+    """Boxes over the borders, empty ones, single pixels, the whole picture, and one that cannot be seen.
+
+    Few boxes, or ones far apart, are counted one by one, many from integral images.
+    """
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     n = draw(st.sampled_from([1, 3, 60]))
     centers, half = rng.uniform(-20, 60, (n, 2)), rng.uniform(0, draw(st.sampled_from([1, 6, 50])), (n, 2))
     boxes = np.hstack([centers - half, centers + half])
+    left, top = float(rng.integers(0, WIDTH)), float(rng.integers(0, HEIGHT))
+    boxes[-1] = draw(
+        st.sampled_from(
+            [
+                boxes[-1],
+                [left, top, left + 1, top + 1],  # one pixel
+                [left, top, left, top + 9],  # empty
+                [0, 0, WIDTH, HEIGHT],  # the whole picture
+                [-1e6, -1e6, 1e6, 1e6],  # more than the whole picture
+            ]
+        )
+    )
     if draw(st.booleans()):
         boxes[0] = np.nan
     return boxes
@@ -53,13 +70,16 @@ def test_counts_are_equal_to_the_last_one(seed, boxes, colors, parts, grid, shar
     book = codebook(rng.random((len(parts), options.n_channels, options.n_bins)) < share, parts)
     scale, perfect = rng.random(len(book.part)), rng.random(len(parts))
     sampling = SamplingOptions(grid=grid, kernel="epanechnikov")
-    expected, in_parts = count(quantize(image, options, gain), boxes, book, sampling)
+    bins = quantize(image, options, gain)
+    expected, in_parts = count(bins, boxes, book, sampling)
     reference = compile_reference(book, scale, perfect)
     asked = image, coding(options, gain), boxes, reference, grid, sampling.kernel
     counts, pixels = counts_compiled(*asked)
     np.testing.assert_array_equal(counts, expected)
     np.testing.assert_array_equal(pixels, in_parts)
-    pattern = Pattern(book, scale, np.searchsorted(book.part, np.arange(len(parts) + 1)), perfect)
+    pattern = Pattern(
+        book, scale, tuple(np.searchsorted(book.part, np.arange(len(parts) + 1)).tolist()), perfect
+    )
     distances = squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
     np.testing.assert_allclose(distances_compiled(*asked), distances, atol=1e-12)
 

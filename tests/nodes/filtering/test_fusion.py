@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
 from nodes.filtering.fusion import (
-    Fused,
+    Factor,
     FusionOptions,
     draw_optimal,
     fuse,
@@ -67,7 +67,7 @@ def test_the_sum_over_the_cameras_is_the_product_of_their_gaussians(rule, seed):
     A = rng.normal(size=(4, 4))
     predicted = Moments(rng.normal(size=4), A @ A.T + 0.1 * np.eye(4))
     measured = [measurement(rng) for _ in range(4)]
-    packed = [pack(exact_result(cloud(rng), predicted, each), options) for each in measured]
+    packed = [pack(exact_result(cloud(rng), predicted, each), 4, options) for each in measured]
     fused = unpack(np.mean(packed, axis=0), 4, 4, options)
     product = Information(sum(each.matrix for each in measured), sum(each.vector for each in measured))
     expected = padded(product) if rule == "eq17" else product
@@ -80,7 +80,7 @@ def test_the_sum_over_the_cameras_is_the_product_of_their_gaussians(rule, seed):
 def test_how_many_numbers_a_camera_sends():
     rng = np.random.default_rng(0)
     result = local_filter(cloud(rng), rng.normal(size=60))
-    assert [len(pack(result, FusionOptions(rule=rule))) for rule in RULES] == [5, 5, 28]
+    assert [len(pack(result, 4, FusionOptions(rule=rule))) for rule in RULES] == [5, 5, 28]
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -90,7 +90,7 @@ def test_cameras_that_see_nothing_change_nothing_to_the_last_bit(rule, proposal)
     options = FusionOptions(rule=rule, proposal=proposal)
     previous = cloud(rng)
     predicted = propagate(previous, MOTION, rng)
-    fused = unpack(pack(local_filter(predicted, np.full(60, -3.7)), options), 4, 4, options)
+    fused = unpack(pack(local_filter(predicted, np.full(60, -3.7)), 4, options), 4, 4, options)
     assert not fused.gain.matrix.any()
     assert not fused.gain.vector.any()
     posterior = fuse(previous, predicted, fused, MOTION, options, rng)
@@ -104,7 +104,7 @@ def test_two_cameras_with_the_same_information_are_one_with_twice(rule):
     options = FusionOptions(rule=rule)
     previous, measured = cloud(rng), measurement(rng)
     predicted = propagate(previous, MOTION, rng)
-    alike = pack(local_filter(predicted, log_factor(predicted.positions, measured, np.zeros(2))), options)
+    alike = pack(local_filter(predicted, log_factor(predicted.positions, measured, np.zeros(2))), 2, options)
     two = unpack((alike + alike) / 2, 2, 4, options)
     one = unpack(2 * alike, 1, 4, options)
     clouds = [
@@ -121,7 +121,7 @@ def test_the_ratio_is_that_of_two_gaussian_densities(seed):
     options = FusionOptions(rule="eq17", ridge=1e-13)
     particles = cloud(rng)
     result = local_filter(particles, rng.normal(size=60))
-    found = reweight_by_ratio(particles, unpack(pack(result, options), 1, 4, options))
+    found = reweight_by_ratio(particles, unpack(pack(result, 1, options), 1, 4, options))
     log_ratio = multivariate_normal(result.posterior.mean, result.posterior.covariance).logpdf(
         particles.states
     ) - multivariate_normal(result.predicted.mean, result.predicted.covariance).logpdf(particles.states)
@@ -137,10 +137,10 @@ def test_a_difference_that_is_no_density_is_told():
     result = local_filter(particles, 10 * outwards)
     eq17 = FusionOptions(rule="eq17")
     assert not is_density(result, eq17)
-    assert not unpack(pack(result, eq17), 4, 4, eq17).is_density
+    assert not unpack(pack(result, 4, eq17), 4, 4, eq17).is_density
     net = FusionOptions(rule="net_information")
     assert is_density(result, net)
-    assert unpack(pack(result, net), 4, 4, net).is_density
+    assert unpack(pack(result, 4, net), 4, 4, net).is_density
 
 
 def test_a_sum_that_is_no_density_is_a_result_and_not_an_exception():
@@ -171,7 +171,7 @@ def test_the_optimal_proposal_against_numerical_integration(on_state):
     factor = Information(np.array([[30.0, 12.0], [12.0, 60.0]]), np.array([5.0, -7.0]))
     prior = np.array([0.5, 0.3, 0.2])
     previous = Particles(x.repeat(n, axis=0), np.log(prior / n).repeat(n))
-    fused = Fused(padded(factor) if on_state else factor, is_density=True)
+    fused = Factor(padded(factor) if on_state else factor, is_density=True)
     drawn = draw_optimal(previous, fused, MOTION, rng)
     expected = [by_integration(MOTION.F[:2] @ each, factor) for each in x]
     evidence = prior * [total for total, _, _ in expected]

@@ -14,10 +14,10 @@ from nodes.filtering.fusion import FusionOptions, fuse, pack, propagate, unpack
 from nodes.filtering.gaussian import Information, Moments, log_factor, moments
 from nodes.filtering.local import local_filter
 from nodes.filtering.motion import DynamicsOptions, autoregression, constant_velocity, predict
-from nodes.filtering.observation import ObservationModel, ObservationOptions, Picture
 from nodes.filtering.particles import resample_if_degenerate, sample_gaussian
 from nodes.filtering.sir import View, sir_step
-from nodes.filtering.target import TargetOptions
+from nodes.vision.observation import ObservationModel, ObservationOptions, Picture
+from nodes.vision.target import TargetOptions
 
 MOTION = constant_velocity(2, 0.1, DynamicsOptions(velocity_variance=0.04))
 AUTOREGRESSION = autoregression(
@@ -102,7 +102,7 @@ def run_fusion(problem, motion, n, seed, options):
             resample_if_degenerate(result.particles, THRESHOLD, rng)
             for result, rng in zip(results, local_rngs, strict=True)
         ]
-        average = np.mean([pack(result, options) for result in results], axis=0)
+        average = np.mean([pack(result, N_CAMERAS, options) for result in results], axis=0)
         fused = unpack(average, N_CAMERAS, 4, options)
         posteriors = [
             fuse(clouds[c], predicted[c], fused, motion, options, rngs[c]) for c in range(N_CAMERAS)
@@ -135,6 +135,8 @@ CASES = {
     FusionOptions(rule="eq17", proposal="prior", local_particles="own"): (300, 0.2),
     FusionOptions(rule="eq17", proposal="prior"): (300, 0.2),
     FusionOptions(rule="eq17", proposal="optimal"): (300, 0.2),
+    FusionOptions(rule="hybrid"): (130, 0.1),
+    FusionOptions(rule="icf"): (130, 0.1),
 }
 
 

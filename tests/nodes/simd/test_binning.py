@@ -5,11 +5,11 @@ import colorsys
 import numpy as np
 import pytest
 
-from nodes.filtering.color import ColorOptions, quantize
 from nodes.simd.array import ProcessorArray
 from nodes.simd.memory import ExternalMemory
 from nodes.simd.options import SimdOptions
 from nodes.simd.programs.binning import BinningOptions, bin_picture, channel_bins
+from nodes.vision.color import ColorOptions, quantize
 
 
 def binned(image, options, *, batching=True):

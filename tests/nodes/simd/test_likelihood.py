@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from nodes.counting.histogram import SamplingOptions, count
-from nodes.filtering.appearance import Appearance
-from nodes.filtering.color import ColorOptions
-from nodes.filtering.pattern import coefficients, pattern_of, squared_distances
 from nodes.simd.likelihood import SimdLikelihood
 from nodes.simd.options import SimdOptions
+from nodes.vision.appearance import Appearance
+from nodes.vision.color import ColorOptions
+from nodes.vision.pattern import coefficients, pattern_of, squared_distances
 
 HEIGHT, WIDTH = 48, 64
 PARTS = {"parts": (0.2, 0.45, 0.35), "part_weights": (0.2, 0.5, 0.3)}

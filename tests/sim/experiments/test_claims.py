@@ -48,7 +48,7 @@ def found(small, claim, errors):
                 }
             )
         groups.append(GroupFindings(replace(group), results))
-    return Findings(options, tuple(groups))
+    return Findings(options, tuple(groups), dict.fromkeys(options.studies, 0))
 
 
 def verdict(small, claim, errors):

@@ -132,7 +132,15 @@ def test_an_experiment_has_its_figures_its_claims_and_its_page(compare, tiny):
     assert result.exit_code == 0
     studies = ["rounds", "graphs", "ways", "frames", "bytes", "time", "strips"]
     figures = {f"{name}.{kind}" for name in [*studies, "tiny-robust"] for kind in ("svg", "png")}
-    others = {"comparison.json", "cells.jsonl", "summary.csv", "timing.json", "claims.md", "parts"}
+    others = {
+        "comparison.json",
+        "cells.jsonl",
+        "summary.csv",
+        "timing.json",
+        "claims.md",
+        "parts",
+        "report.html",
+    }
     assert {path.name for path in Path("out").iterdir()} == figures | others
     claims = json.loads(Path("out/comparison.json").read_text())["claims"]
     assert [(each["label"], each["claim"]) for each in claims] == [

@@ -1,5 +1,7 @@
 """What the panels draw, against the findings that they draw it from."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -36,7 +38,8 @@ def findings(small):
         {"name": "e", "runs": 3, "scenarios": [str(small)], "page": ["error", "paths"], "studies": studies}
     )
     plan = make_plan(options, small.parent, [], lambda *_: "here")
-    return Findings(options, tuple(GroupFindings(group, list(results(group))) for group in plan.groups))
+    groups = tuple(GroupFindings(group, list(results(group))) for group in plan.groups)
+    return Findings(options, groups, dict.fromkeys(studies, 0))
 
 
 def results(group):
@@ -98,6 +101,17 @@ def test_a_line_for_each_estimator_and_each_value_of_the_second_key(findings):
     np.testing.assert_allclose(few.get_ydata(), [0.1 + 10 / 300 + 0.01, 0.1 / 12 + 10 / 300 + 0.01])
     assert few.get_color() == COLORS["dcpf"]
     assert few.get_linestyle() != drawn["DCPF, n = 500"].get_linestyle()
+
+
+def test_of_an_interrupted_study_the_lines_are_as_long_as_there_are_settings(findings):
+    """All but the last: t = 12 with 500 particles."""
+    last = {"network.iterations": "12", "filter.n_particles": "500"}
+    groups = tuple(each for each in findings.groups if each.settings != last)
+
+    drawn = lines(panel(replace(findings, groups=groups), "error"))
+
+    np.testing.assert_allclose(drawn["DCPF, n = 300"].get_xdata(), [1, 12])
+    np.testing.assert_allclose(drawn["DCPF, n = 500"].get_xdata(), [1])
 
 
 def test_words_stand_at_their_place_on_the_axis(findings):

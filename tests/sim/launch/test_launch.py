@@ -33,6 +33,20 @@ def recorded_in_process(folder, path, *overrides):
     return folder
 
 
+def test_a_grid_of_sixteen_cameras_is_the_same_in_processes_as_in_one(launched, tmp_path):
+    hall, brief = ROOT / "scenarios" / "hall.yaml", {"baselines.single": "false", "filter.n_particles": "30"}
+    settings = [each for key, value in brief.items() for each in ("--set", f"{key}={value}")]
+    launched.run(hall, "--frames", 4, *settings, "--json")
+    code, stdout, _ = launched.end(60)
+    assert code == 0
+    assert launched.is_gone()
+    summary = json.loads(stdout)
+    assert summary["processes"] == 18
+    assert summary["network"]["messages_per_frame"] == 2 * 24 * 12  # links both ways, rounds
+    alone = recorded_in_process(tmp_path / "alone", hall, ("frames", "4"), *brief.items())
+    assert (launched.out / "estimates.jsonl").read_bytes() == (alone / "estimates.jsonl").read_bytes()
+
+
 def test_scene_1_is_the_same_in_processes_as_in_one_and_is_heard_from_outside(launched, dcpf, tmp_path):
     scene = ROOT / "scenarios" / "scene1.yaml"
     watch = launched.beside(*dcpf, "watch", "--json", "--connect", launched.router)

@@ -1,7 +1,6 @@
 """The live page in a real browser: a run, a node that dies, a recording that is turned back."""
 
 import os
-import shutil
 import signal
 import socket
 import sys
@@ -10,23 +9,12 @@ import pytest
 
 from sim.running.recorder import FILM
 
-webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-DRIVER = shutil.which("chromedriver")
-
 pytestmark = [
     pytest.mark.processes,
     pytest.mark.timeout(120),
     pytest.mark.skipif(sys.platform != "linux", reason="finds the processes of a run in /proc"),
-    pytest.mark.skipif(
-        not (CHROMIUM and DRIVER), reason="needs Chromium: apt-get install chromium chromium-driver"
-    ),
 ]
 
-QUIET = (
-    *("headless=new", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-sync"),
-    *("disable-background-networking", "disable-component-update"),
-)
 VERMILLION = "rgb(213, 94, 0)"
 # how many different colours a canvas shows, and whether one of them is there
 COLORS_OF = """
@@ -86,19 +74,12 @@ class Page:
 
 
 @pytest.fixture
-def page(tmp_path, wait_until):
+def page(browser, wait_until):
     """A page that is not open yet, at a free port."""
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for switch in (*QUIET, f"user-data-dir={tmp_path / 'browser'}"):
-        options.add_argument(f"--{switch}")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    yield Page(driver, f"http://127.0.0.1:{port}/", wait_until)
-    driver.quit()
+    return Page(browser, f"http://127.0.0.1:{port}/", wait_until)
 
 
 def port_of(page):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
-from nodes.filtering.target import project_boxes
+from nodes.vision.target import project_boxes
 from sim.assembly import Assembly
 from sim.live.nodes import NodeStates
 from sim.live.setting import setting

@@ -13,7 +13,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
 from network.messages import EstimateMessage, PreviewMessage
-from nodes.filtering.target import project_boxes
+from nodes.vision.target import project_boxes
 from sim.assembly import Assembly
 from sim.recording import foxglove
 from sim.recording.film import McapFilm

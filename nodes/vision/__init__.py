@@ -1,0 +1,1 @@
+"""What a camera sees of the target: colours, histograms, distances, likelihoods."""

@@ -1,0 +1,137 @@
+"""Three ways for a node to exchange a message with each of its neighbours: a round, and its two floors.
+
+All three carry the same bytes over the same graph: the node's own rounds, as a run has them; Zenoh bare, with
+the same kind of session, publisher and channels; and plain Unix sockets.
+"""
+
+import socket
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+import zenoh
+from zenoh import CongestionControl, Locality, Priority
+
+from network import codec, keys, sessions
+from network.averaging.metropolis import MetropolisWeights
+from network.consensus import Consensus
+from network.graph import Graph
+from network.messages import ConsensusMessage
+from network.transport import Links
+from network.zenoh import ZenohTransport
+
+N_NUMBERS = 5
+"""What the net information has on a plane."""
+PATIENCE_S = 20.0
+
+
+class Exchange(Protocol):
+    """A way to exchange messages."""
+
+    def rounds(self, count: int) -> None:
+        """Says something to all neighbours and hears all of them, so many times."""
+
+
+class ConsensusRounds:
+    """The rounds of a run: `network.consensus` over `network.zenoh`."""
+
+    def __init__(self, run: str, name: str, graph: Graph, folder: str) -> None:
+        """Opens the node's transport and waits for its neighbours.
+
+        Args:
+            run: Name of the run.
+            name: The node.
+            graph: Who talks to whom.
+            folder: Of the sockets.
+        """
+        links = Links(neighbors=graph.neighbors(name))
+        listen, connect = _endpoints(name, graph, f"{folder}/t")
+        self._transport = ZenohTransport(run, name, links, listen, connect, drop_late_pixels=False)
+        self._transport.announce()
+        self._transport.wait_until_alive(links.neighbors, PATIENCE_S)
+        self._name, self._graph, self._frame = name, graph, 0
+
+    def rounds(self, count: int) -> None:
+        """A frame of so many rounds."""
+        algorithm = MetropolisWeights().tuned(self._graph, count)
+        consensus = Consensus(self._name, self._graph.neighbors(self._name), algorithm, count)
+        for said in consensus.begin(self._frame, np.arange(N_NUMBERS, dtype=float)):
+            self._transport.send(said)
+        while waiting := consensus.waiting_for():
+            message = self._transport.receive(waiting[0], PATIENCE_S)
+            if not isinstance(message, ConsensusMessage):
+                raise TimeoutError(f"{self._name} heard nothing of {waiting[0]}")
+            for reply in consensus.receive(message):
+                self._transport.send(reply)
+        self._frame += 1
+
+    def close(self) -> None:
+        """Leaves the network."""
+        self._transport.close()
+
+
+class BareZenoh:
+    """A publisher, a channel for each neighbour, and bytes."""
+
+    def __init__(self, run: str, name: str, graph: Graph, folder: str) -> None:
+        """Opens a session of its own, of the same kind (see `ConsensusRounds`)."""
+        listen, connect = _endpoints(name, graph, f"{folder}/b")
+        self._session = sessions.open_peer(listen, connect)
+        self._inboxes = [
+            self._session.declare_subscriber(keys.consensus(run, other), zenoh.handlers.RingChannel(64))
+            for other in graph.neighbors(name)
+        ]
+        self._publisher = self._session.declare_publisher(
+            keys.consensus(run, name),
+            congestion_control=CongestionControl.BLOCK,
+            priority=Priority.REAL_TIME,
+            express=True,
+            allowed_destination=Locality.REMOTE,
+        )
+        self._data = _message(run, name)
+
+    def rounds(self, count: int) -> None:
+        """Puts and receives, and nothing else."""
+        for _ in range(count):
+            self._publisher.put(self._data)
+            for inbox in self._inboxes:
+                inbox.recv().payload.to_bytes()
+
+    def close(self) -> None:
+        """Ends the session."""
+        sessions.close(self._session)
+
+
+class PlainSockets:
+    """A stream socket for each neighbour: what the operating system takes, and Python to call it."""
+
+    def __init__(self, run: str, name: str, ends: Sequence[socket.socket]) -> None:
+        """Ends of connected sockets, one for each neighbour."""
+        self._ends, self._data = ends, _message(run, name)
+
+    def rounds(self, count: int) -> None:
+        """Sends and receives, and nothing else."""
+        for _ in range(count):
+            for end in self._ends:
+                end.sendall(self._data)
+            for end in self._ends:
+                end.recv(len(self._data), socket.MSG_WAITALL)
+
+
+def connected(graph: Graph) -> Mapping[str, Sequence[socket.socket]]:
+    """A pair of sockets for each edge, whose ends the nodes inherit; in the order of their neighbours."""
+    pairs = {edge: socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM) for edge in sorted(graph.edges)}
+    return {
+        name: [pairs[min(name, other), max(name, other)][name > other] for other in graph.neighbors(name)]
+        for name in graph.names
+    }
+
+
+def _message(run: str, name: str) -> bytes:
+    return codec.encode(run, ConsensusMessage(name, 1, 1, 2, np.arange(N_NUMBERS, dtype=float)))
+
+
+def _endpoints(name: str, graph: Graph, prefix: str) -> tuple[list[str], list[str]]:
+    """Where a node listens, and the earlier neighbours that it connects to."""
+    earlier = [other for other in graph.neighbors(name) if other < name]
+    return [f"unixsock-stream/{prefix}{name}"], [f"unixsock-stream/{prefix}{other}" for other in earlier]

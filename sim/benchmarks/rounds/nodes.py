@@ -1,0 +1,96 @@
+"""The processes of `dcpf bench consensus`: this one forks a node for each name and collects what they timed.
+
+Usage: python -m sim.benchmarks.rounds.nodes JSON, with shape, n, folder and turns; JSON comes out.
+"""
+
+import json
+import os
+import sys
+import time
+from statistics import median
+from typing import Any
+
+from network.graph import Graph
+from sim.benchmarks.rounds.exchange import BareZenoh, ConsensusRounds, Exchange, PlainSockets, connected
+from sim.scenario.model import GRAPHS
+
+ROUNDS = 12
+"""Rounds of a turn, as a frame has."""
+_RUN = "bench"
+
+
+def main() -> int:
+    """Forks the nodes, before any thread and any session, and prints the medians over them."""
+    order = json.loads(sys.argv[1])
+    graph = GRAPHS[order["shape"]]([f"N{index:02}" for index in range(order["n"])])
+    ends = connected(graph)
+    hold_read, hold_write = os.pipe()
+    results: dict[str, int] = {}
+    for name in graph.names:
+        read, write = os.pipe()
+        if os.fork() == 0:
+            # From here on, this is the node's process.
+            os.close(hold_write)
+            code = 1
+            try:
+                _be_node(name, graph, order, PlainSockets(_RUN, name, ends[name]), write, hold_read)
+                code = 0
+            finally:
+                os._exit(code)
+        os.close(write)
+        results[name] = read
+    told = [_read_all(read) for read in results.values()]
+    os.close(hold_write)  # everybody may leave
+    for _ in graph.names:
+        os.wait()
+    if not all(told):
+        return 1
+    nodes = [json.loads(each) for each in told]
+    print(json.dumps({key: median(node[key] for node in nodes) for key in nodes[0]}))  # noqa: T201
+    return 0
+
+
+def _be_node(
+    name: str, graph: Graph, order: dict[str, Any], sockets: PlainSockets, write: int, hold: int
+) -> None:
+    """A node: all three ways in turn, several times over, and then the medians."""
+    consensus = ConsensusRounds(_RUN, name, graph, order["folder"])
+    bare = BareZenoh(_RUN, name, graph, order["folder"])
+    # a first turn over sockets, which are there already, so that nobody speaks before all can hear
+    time.sleep(order["settle_s"])
+    sockets.rounds(len(graph.names))
+    ways: dict[str, Exchange] = {
+        "round_us": consensus,
+        "bare_zenoh_us": bare,
+        "plain_socket_us": sockets,
+    }
+    os.write(write, json.dumps(_timed(ways, sockets, len(graph.names), order["turns"])).encode())
+    os.close(write)
+    os.read(hold, 1)  # a goodbye could overtake the last messages to the others
+    consensus.close()
+    bare.close()
+
+
+def _timed(ways: dict[str, Exchange], barrier: Exchange, n_nodes: int, turns: int) -> dict[str, float]:
+    """The median time of a round of each way, and the processor time of one of a run's rounds, in µs."""
+    wall: dict[str, list[float]] = {name: [] for name in ways}
+    cpu: list[float] = []
+    for turn in range(turns + 1):
+        for name, way in ways.items():
+            # everybody begins a turn together: after as many rounds as nodes, all have heard of all
+            barrier.rounds(n_nodes)
+            began, processor = time.perf_counter(), time.process_time()
+            way.rounds(ROUNDS)
+            if turn:  # the first warms up
+                wall[name].append((time.perf_counter() - began) / ROUNDS)
+                if name == "round_us":
+                    cpu.append((time.process_time() - processor) / ROUNDS)
+    return {name: 1e6 * median(times) for name, times in wall.items()} | {"cpu_us": 1e6 * median(cpu)}
+
+
+def _read_all(descriptor: int) -> bytes:
+    return b"".join(iter(lambda: os.read(descriptor, 65536), b""))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,61 @@
+"""A scenario's faults in real processes: killed, stopped and started again, and the router as well."""
+
+import json
+import sys
+
+import pytest
+
+pytestmark = [
+    pytest.mark.processes,
+    pytest.mark.timeout(120),
+    pytest.mark.skipif(sys.platform != "linux", reason="finds the processes of a run in /proc"),
+]
+
+NAMES = ["A", "B", "C", "D"]
+
+
+@pytest.fixture
+def summary(launched, small):
+    """Runs the small scenario with faults, at 10 frames a second, and reads its summary and its events."""
+
+    def run(frames, *faults, pace="realtime"):
+        more = ["--set", f"faults={json.dumps(faults)}", "--set", "baselines.single=false"]
+        launched.run(small, "--pace", pace, "--frames", frames, *more, "--json")
+        code, stdout, stderr = launched.end(90)
+        assert code == 0, stderr
+        assert launched.is_gone()
+        return json.loads(stdout), [json.loads(line) for line in launched.lines("events")]
+
+    return run
+
+
+def test_nodes_that_are_stopped_or_started_again_come_back(summary):
+    found, events = summary(
+        110,
+        {"kind": "hang", "node": "B", "frame": 10, "frames": 20},
+        {"kind": "restart", "node": "C", "frame": 45, "frames": 5},
+    )
+    assert found["died"] == []
+    told = [(each["event"], each["node"]) for each in events]
+    for event in (("wake", "B"), ("killed", "C"), ("start", "C")):
+        assert event in told
+    changes = [(each["event"], each["node"]) for each in found["members"]["events"]]
+    assert changes == [("lost", "B"), ("back", "B"), ("lost", "C"), ("back", "C")]
+    # in the end all are there again, count each other, and agree
+    assert [found["members"]["per_frame"][name][-1] for name in NAMES] == [4] * 4
+    assert found["disagreement_per_frame_m"][-1] < 0.05
+
+
+def test_a_node_that_is_killed_on_purpose_is_no_accident(summary):
+    found, events = summary(40, {"kind": "kill", "node": "B", "frame": 8}, pace="lockstep")
+    assert found["died"] == []
+    assert ("killed", "B") in [(each["event"], each["node"]) for each in events]
+    assert [found["members"]["per_frame"][name][-1] for name in ("A", "C", "D")] == [3] * 3
+
+
+def test_nodes_talk_to_each_other_while_the_router_is_away(summary):
+    found, events = summary(60, {"kind": "restart_router", "frame": 10})
+    assert found["died"] == []
+    assert ("restart", "router") in [(each["event"], each["node"]) for each in events]
+    assert found["network"]["late"] < 60
+    assert [found["members"]["per_frame"][name][-1] for name in NAMES] == [4] * 4
