@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from nodes.camera import look_at
 from nodes.counting.histogram import SamplingOptions
-from nodes.filtering import observation
 from nodes.filtering.particles import Particles, normalize, resample, systematic_indices
 from nodes.threads import in_shares, n_shares
+from nodes.vision import observation
 from nodes.vision.observation import ObservationModel, ObservationOptions
 from nodes.vision.target import TargetOptions
 
