@@ -9,8 +9,8 @@ import numpy as np
 
 from network.messages import EstimateMessage, PixelsMessage
 from sim.assembly import Assembly
+from sim.metrics.errors import position_errors, rmse
 from sim.running.in_process import run_in_process
-from sim.running.metrics import position_errors, rmse
 from sim.running.results import Results
 from sim.scenario.loading import load_scenario
 

@@ -55,7 +55,7 @@ def extremes_of(graph: Graph) -> Spectrum:
     # SciPy takes its time to import, and node processes do without.
     from scipy.sparse.linalg import eigsh  # noqa: PLC0415
 
-    from network.averaging.matrices import laplacian  # noqa: PLC0415
+    from network.laplacian import laplacian  # noqa: PLC0415
 
     L = laplacian(graph)
     start = np.cos(np.arange(len(graph.names)))  # any fixed one, so that the numbers repeat

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from sim.running.metrics import LOST_ERROR, LOST_FRAMES
+from sim.metrics.errors import LOST_ERROR, LOST_FRAMES
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from pydantic import TypeAdapter
 from network.averaging import matrices
 from network.consensus import Consensus
 from network.graph import Graph
+from network.laplacian import laplacian
 from network.memory import MemoryNetwork
 from network.messages import ConsensusMessage
 from network.quantization import Quantizer
@@ -155,7 +156,7 @@ def _theory(
     options: ConsensusOptions, graph: Graph, spectrum: Spectrum, rounds: int
 ) -> tuple[float, Float[np.ndarray, " T"] | None]:
     """The rate, and the residual after each round, from the algorithm's matrices."""
-    L = matrices.laplacian(graph)
+    L = laplacian(graph)
     match options.algorithm:
         case "constant":
             rate = matrices.linear_rate(L, options.epsilon)

@@ -9,10 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
-from sim.metrics.loss import losses
-from sim.metrics.sets import gospa, ospa
-from sim.running.members import disagreements, membership
-from sim.running.metrics import (
+from sim.metrics.errors import (
     LOST_DIAGONALS,
     LOST_ERROR,
     LOST_FRAMES,
@@ -22,6 +19,9 @@ from sim.running.metrics import (
     position_errors,
     rmse,
 )
+from sim.metrics.loss import losses
+from sim.metrics.sets import gospa, ospa
+from sim.running.members import disagreements, membership
 from sim.running.traffic import network_figures
 from sim.scenario.model import Scenario
 

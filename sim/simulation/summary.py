@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from network.streams import stream
 from nodes.filtering.fusion import packed_size
 from nodes.filtering.gaussian import Moments
-from sim.running.metrics import rmse
+from sim.metrics.errors import rmse
 from sim.scenario.model import Scenario
 from sim.simulation.gaussians import normalized_errors
 from sim.simulation.simulation import SimulatedFrame

@@ -12,8 +12,8 @@ from network.messages import EstimateMessage, TruthMessage
 from sim.assembly import Assembly
 from sim.commands.app import app
 from sim.experiments.found.figures import compare
+from sim.metrics.errors import LOST_DIAGONALS
 from sim.pictures.clip import make_clip
-from sim.running.metrics import LOST_DIAGONALS
 from sim.running.recorder import Recorder, read_run
 from sim.running.results import Results, length, summarize
 from sim.scenario.loading import load_scenario

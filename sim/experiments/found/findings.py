@@ -11,7 +11,7 @@ from sim.experiments.computing.parts import Kind
 from sim.experiments.found.joining import joined
 from sim.experiments.options import ExperimentOptions
 from sim.experiments.plan import Group
-from sim.running.metrics import rmse
+from sim.metrics.errors import rmse
 
 Track = Literal["dcpf", "cpf", "single", "coded"]
 """Whose error: all nodes of DCPF, CPF, the best single camera of each run, CPF on pictures sent as JPEG."""

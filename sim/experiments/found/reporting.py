@@ -15,9 +15,9 @@ from sim.experiments.computing.work import as_plain
 from sim.experiments.found.claims import Verdict, as_data
 from sim.experiments.found.figures import compare
 from sim.experiments.found.findings import Findings, GroupFindings, Track
+from sim.metrics.errors import is_lost
 from sim.metrics.intervals import mean_interval
 from sim.metrics.sets import gospa, ospa
-from sim.running.metrics import is_lost
 from sim.running.results import Results, in_unit, length
 
 _TRACKS: tuple[Track, ...] = ("dcpf", "cpf", "single", "coded")

@@ -8,10 +8,10 @@ from scipy import stats
 
 from sim.metrics.bounds import posterior_cramer_rao
 from sim.metrics.consistency import anees_band, chi_square_quantile, nees
+from sim.metrics.errors import anees
 from sim.metrics.intervals import bootstrap, mean_interval, ratio_interval
 from sim.metrics.loss import Loss, losses
 from sim.metrics.sets import gospa, ospa
-from sim.running.metrics import anees
 
 NAN = float("nan")
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim.running.metrics import LOST_ERROR, anees, disagreement, is_lost, position_errors, rmse
+from sim.metrics.errors import LOST_ERROR, anees, disagreement, is_lost, position_errors, rmse
 
 NAN = float("nan")
 
