@@ -52,12 +52,8 @@ def test_looking_changes_no_numbers(room):
     furnished = room()
     estimates = []
     for looked_at in (False, True):
-        camera = SmartCamera(
-            furnished.models["C1"],
-            furnished.setup,
-            Consensus("C1", (), MetropolisWeights(), 1),
-            ("C1",),
-        )
+        alone = Consensus("C1", (), MetropolisWeights(), 1)
+        camera = SmartCamera(furnished.models["C1"], furnished.setup, [alone])
         for frame in range(4):
             image = furnished.image("C1", frame)
             (*_, estimate) = camera.on_frame(frame, image)
