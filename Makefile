@@ -3,12 +3,15 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check docs install clean
+.PHONY: demo test coverage check docs install clean
 
 demo: $(VENV)/installed  ## scene 1 with four camera processes and the central one, and how they compare
 	$(BIN)/dcpf run scenarios/scene1.yaml
 
 test: $(VENV)/installed-dev check  ## all checks and all tests
+	$(BIN)/python -m pytest --durations=15
+
+coverage: $(VENV)/installed-dev  ## which lines no test runs; the tests take a third longer
 	$(BIN)/coverage run -m pytest
 	$(BIN)/coverage report --skip-covered --skip-empty
 
