@@ -111,18 +111,20 @@ def test_scene_2_is_in_view_of_all_four_throughout():
     assert (np.array(seen) > 0.5).sum(axis=0).min() >= 2
 
 
+OFF_ARRAY = ("filter.backend", "fast")
 WALKER = [("target.object", "null"), ("target.person", "walker"), ("target.size_px", "[24, 60]")]
 
 
 @pytest.mark.parametrize(
     ("name", "overrides", "limit"),
     [
-        ("wica", [], 6),
-        ("wica", [("preset", "robust")], 3),
+        ("wica", [("frames", "60")], 6),
+        ("wica", [OFF_ARRAY], 6),
+        ("wica", [OFF_ARRAY, ("preset", "robust")], 3),
         ("embedded", [], 10),
         ("embedded", WALKER, 15),
     ],
-    ids=["face", "face-robust", "cup", "walker"],
+    ids=["face-on-the-array", "face", "face-robust", "cup", "walker"],
 )
 def test_the_papers_trackers_follow_their_targets(summary_of, name, overrides, limit):
     summary = summary_of(FOLDER / f"{name}.yaml", *overrides, ("seed", "3"))
