@@ -83,7 +83,7 @@ def test_what_a_page_says_can_be_done(page, terminals):
 def readme_commands():
     """The commands of the README: its indented lines."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    return commands("\n".join(re.findall(r"^ {4}(?:\$ )?(dcpf .*)$", text, re.MULTILINE)))
+    return commands("\n".join(re.findall(r"^ {4}(?:\$ )?(dcpf (?:.*\\\n)*.*)$", text, re.MULTILINE)))
 
 
 CALLS = [
