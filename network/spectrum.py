@@ -53,9 +53,9 @@ def extremes_of(graph: Graph) -> Spectrum:
         return spectrum_of(graph)
     graph.require_connected()
     # SciPy takes its time to import, and node processes do without.
-    from scipy.sparse.linalg import eigsh  # noqa: PLC0415
+    from scipy.sparse.linalg import eigsh  # noqa: PLC0415 - see above
 
-    from network.laplacian import laplacian  # noqa: PLC0415
+    from network.laplacian import laplacian  # noqa: PLC0415 - so does this
 
     L = laplacian(graph)
     start = np.cos(np.arange(len(graph.names)))  # any fixed one, so that the numbers repeat

@@ -28,7 +28,7 @@ class LoopModel(ObservationModel):
         self,
         picture: Picture,
         boxes: Float[np.ndarray, "N 4"],
-        appearance: Appearance,  # noqa: ARG002
+        appearance: Appearance,  # noqa: ARG002 - as the model has it
     ) -> Float[np.ndarray, " N"]:
         """d² of each box to the reference, that of the loop itself."""
         color = self.options.color

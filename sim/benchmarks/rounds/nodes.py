@@ -46,7 +46,7 @@ def main() -> int:
     if not all(told):
         return 1
     nodes = [json.loads(each) for each in told]
-    print(json.dumps({key: median(node[key] for node in nodes) for key in nodes[0]}))  # noqa: T201
+    print(json.dumps({key: median(node[key] for node in nodes) for key in nodes[0]}))  # noqa: T201 - read by who started it
     return 0
 
 
