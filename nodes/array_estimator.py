@@ -36,7 +36,10 @@ class ArrayEstimator:
             ValueError: The array cannot do what the options ask for; the text says which and what to do.
         """
         self._node, self._setup = node, setup
-        self._tracker = self._new_tracker(setup.filter.likelihood.sigma)
+        try:
+            self._tracker = SimdTracker(_tracker_options(setup), setup.stream(node, "array"))
+        except LineMemoryError as error:
+            raise ValueError(f"filter.simd.words is {setup.filter.simd.words}: {error}") from error
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
         self._before = setup.start.moments
@@ -57,9 +60,6 @@ class ArrayEstimator:
             ValueError: The picture is wider than the array.
         """
         self._appearance = appearance
-        if appearance is not None:
-            # σ as the camera has set it, by what surrounds the target if so asked
-            self._tracker = self._new_tracker(float(np.sqrt(appearance.variance)))
         self._tracker.begin(picture.image, self._before.mean[:2])
         n = float(self._setup.filter.n_particles)
         return self._message(0, self._before, n, visible=True)
@@ -93,13 +93,6 @@ class ArrayEstimator:
         )
         return self._message(frame, state, self._tracker.ess(), visible=visible)
 
-    def _new_tracker(self, sigma: float) -> SimdTracker:
-        setup = self._setup
-        try:
-            return SimdTracker(_tracker_options(setup, sigma), setup.stream(self._node, "array"))
-        except LineMemoryError as error:
-            raise ValueError(f"filter.simd.words is {setup.filter.simd.words}: {error}") from error
-
     def _message(self, frame: int, estimate: Moments, ess: float, *, visible: bool) -> EstimateMessage:
         return EstimateMessage(
             run=self._setup.run,
@@ -117,7 +110,7 @@ class ArrayEstimator:
         )
 
 
-def _tracker_options(setup: TrackingSetup, sigma: float) -> TrackerOptions:
+def _tracker_options(setup: TrackingSetup) -> TrackerOptions:
     """The tracker's options from those of the run.
 
     Raises:
@@ -139,7 +132,8 @@ def _tracker_options(setup: TrackingSetup, sigma: float) -> TrackerOptions:
         region_px=(int(size_px[0]), int(size_px[1])),
         process=_process(chosen.dynamics),
         noise_px=float(np.sqrt(chosen.dynamics.position_variance)),
-        sigma=sigma,
+        # set from the background, it would be too sharp for ten bits: the paper's tracker has a fixed one
+        sigma=chosen.likelihood.sigma,
     )
 
 
