@@ -194,7 +194,12 @@ class ProcessorArray(LaneMachine):
     # From one element to the next, and from one iteration to the next
 
     def neighbour(self, word: Word, offset: int) -> Lanes:
-        """The word of the neighbour at +1 (right) or -1 (left), as an operand; 0 beyond the last element."""
+        """The word of the neighbour at +1 (right) or -1 (left), as an operand; 0 beyond the last element.
+
+        Raises:
+            ValueError: The lanes are those of several passes.
+        """
+        self._require_neighbours()
         value = self._value(word)
         moved = np.zeros_like(value)
         here, there = (slice(None, -1), slice(1, None))[:: 1 if offset > 0 else -1]
@@ -202,12 +207,21 @@ class ProcessorArray(LaneMachine):
         return moved
 
     def shift(self, word: Word, offset: int) -> None:
-        """Each element takes the word of its neighbour at `offset`, in a loop once in every iteration."""
+        """Each element takes the word of its neighbour at `offset`, in a loop once in every iteration.
+
+        Raises:
+            ValueError: The lanes are those of several passes.
+        """
+        self._require_neighbours()
         if self._loop is None:
             self.copy(word, self.neighbour(word, offset))
             return
         self._count(load=word.n_words, store=word.n_words)
         word.value = self._loop.shifted(word, offset)
+
+    def _require_neighbours(self) -> None:
+        if not self.has_neighbours:
+            raise ValueError("the lanes are pieces of work, of which none has a neighbour: leave out lanes")
 
     def accumulate(self, total: Word, a: Operand, when: Flag | None = None) -> None:
         """Adds a to total, also over the iterations of a loop."""

@@ -1,6 +1,6 @@
 """The lanes of the array: words, loops and counts, under the instructions."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -25,15 +25,23 @@ class LaneMachine:
 
     Args:
         options: The processor.
-        batching: Whether loops run all iterations at once; the words and the counts are the same either way.
+        batching: Whether loops run all iterations, and routines all steps, at once; the words and the counts
+            are the same either way.
+        lanes: How many pieces of work there are for one element each, if not one for every element. As many
+            passes of the whole program as they take run side by side, and no lane has a neighbour.
+
+    Attributes:
+        n: The lanes.
     """
 
-    def __init__(self, options: SimdOptions, *, batching: bool = True) -> None:
+    def __init__(self, options: SimdOptions, *, batching: bool = True, lanes: int | None = None) -> None:
         self.options = options
-        self.n = options.processing_elements
+        self.n = options.processing_elements if lanes is None else lanes
+        self.has_neighbours = lanes is None
+        self._passes = max(1, -(-self.n // options.processing_elements))
         self.line_memory = LineMemory(options.words)
         self.costs: dict[str, Cost] = {}
-        self._batching = batching
+        self.batching = batching
         self._loop: Loop | None = None
         self._cost = Cost()
 
@@ -48,10 +56,27 @@ class LaneMachine:
         finally:
             self._cost = before
 
+    def at_once(self, cost: Cost, target: Word, result: Callable[..., Lanes], *operands: Word) -> None:
+        """Stores what the steps of a routine would leave in a word.
+
+        Args:
+            cost: What the steps cost, which does not depend on the data.
+            target: The word.
+            result: What they leave there, in closed form.
+            operands: What it is made from.
+        """
+        self._cost.add(cost, times=self._times)
+        self._store(target, result(*map(self._value, operands)).astype(target.dtype, copy=False), None)
+
+    @property
+    def _times(self) -> int:
+        """How often an instruction is done: in each pass, and in each iteration."""
+        return self._passes * (self._loop.n if self._loop else 1)
+
     def _count(self, **instructions: int) -> None:
-        times = self._loop.n if self._loop else 1
+        times, counted = self._times, self._cost.instructions
         for kind, n in instructions.items():
-            self._cost.instructions[kind] += n * times
+            counted[kind] += n * times
 
     # Line memory
 
@@ -118,7 +143,7 @@ class LaneMachine:
         Raises:
             ValueError: An iteration reads what the one before has written.
         """
-        if not self._batching:
+        if not self.batching:
             yield from range(n)
             return
         if self._loop:
