@@ -185,11 +185,11 @@ class ProcessorArray(LaneMachine):
         """One word of several as an operand, 0 being the lowest."""
         return (self._value(word) >> index * self.options.bits) & ((1 << self.options.bits) - 1)
 
-    def indexed(self, words: Sequence[Word], index: int | Int[np.ndarray, "n 1"]) -> Operand:
+    def indexed(self, words: Sequence[Word], index: int | Int[np.ndarray, "..."]) -> Operand:
         """The word whose address the control processor counts up in a loop, as an operand."""
         if isinstance(index, int):
             return words[index]
-        return np.stack([self._value(words[i]) for i in index[:, 0]])
+        return np.stack([self._value(words[i]) for i in index.ravel()]).reshape(*index.shape[:-1], self.n)
 
     # From one element to the next, and from one iteration to the next
 
@@ -252,10 +252,12 @@ class ProcessorArray(LaneMachine):
     def fetch(self, target: Word, memory: ExternalMemory, column: Word, row: Word, active: slice) -> None:
         """The input processor reads the pixel that each active element asks for; -1 outside the picture."""
         columns, rows = self._value(column)[..., active], self._value(row)[..., active]
-        self._cost.external_reads += columns.shape[-1] * (self._loop.n if self._loop else 1)
+        self._cost.external_reads += columns.shape[-1] * self._iterations
         pixels = memory.read(columns, rows)
-        value = np.full((*pixels.shape[:-1], self.n), -1, pixels.dtype)
-        value[..., active] = pixels
+        value = pixels
+        if pixels.shape[-1] < self.n:
+            value = np.full((*pixels.shape[:-1], self.n), -1, pixels.dtype)
+            value[..., active] = pixels
         self._store(target, value, None)
 
     def output(
@@ -263,13 +265,13 @@ class ProcessorArray(LaneMachine):
     ) -> None:
         """The digital output processor stores the first elements of a line in the external memory."""
         width = memory.pixels.shape[1]
-        self._cost.external_writes += width * (self._loop.n if self._loop else 1)
+        self._cost.external_writes += width * self._iterations
         memory.pixels[rows] = self._value(word)[..., :width]
 
     def collect(self, word: Word, elements: slice) -> Num[np.ndarray, "..."]:
         """The digital output processor takes the words of some elements to the external memory."""
         values = self._value(word)[..., elements]
-        self._cost.external_writes += values.shape[-1] * (self._loop.n if self._loop else 1)
+        self._cost.external_writes += values.shape[-1] * self._iterations
         return values
 
     def peek(self, word: Word, element: int) -> Scalar:

@@ -71,7 +71,11 @@ class LaneMachine:
     @property
     def _times(self) -> int:
         """How often an instruction is done: in each pass, and in each iteration."""
-        return self._passes * (self._loop.n if self._loop else 1)
+        return self._passes * self._iterations
+
+    @property
+    def _iterations(self) -> int:
+        return self._loop.iterations if self._loop else 1
 
     def _count(self, **instructions: int) -> None:
         times, counted = self._times, self._cost.instructions
@@ -126,7 +130,7 @@ class LaneMachine:
             value = _chosen(when, value, old)
         if self._loop:
             self._loop.write(target)
-        if np.ndim(value) == 0:
+        if not isinstance(value, np.ndarray) or not value.ndim:
             value = np.full(self.n, value, target.dtype)
         elif value.shape[-1] != self.n:
             value = np.broadcast_to(value, (*value.shape[:-1], self.n))
@@ -134,11 +138,11 @@ class LaneMachine:
 
     # Loops
 
-    def repeat(self, n: int) -> Iterator[int | Int[np.ndarray, "n 1"]]:
+    def repeat(self, n: int) -> Iterator[int | Int[np.ndarray, "..."]]:
         """A loop of the control processor; yields its counter.
 
         With batching, all iterations run at once on a leading axis. What one leaves to the next must go
-        through `accumulate`, `shift` or `keep`.
+        through `accumulate`, `shift` or `keep`; in a loop inside of another, through `accumulate`.
 
         Raises:
             ValueError: An iteration reads what the one before has written.
@@ -146,14 +150,12 @@ class LaneMachine:
         if not self.batching:
             yield from range(n)
             return
-        if self._loop:
-            raise ValueError("loops that run all iterations at once do not nest: use range for the inner one")
-        self._loop = Loop(n)
+        around, self._loop = self._loop, Loop(n, self._loop)
         try:
-            yield np.arange(n, dtype=np.int32)[:, None]
+            yield self._loop.counter
             self._loop.finish()
         finally:
-            self._loop = None
+            self._loop = around
 
 
 def _chosen(when: Flag, value: Any, old: Lanes) -> Lanes:
