@@ -113,7 +113,9 @@ class Loop:
 
     def _each(self, lanes: Num[np.ndarray, "..."] | Bool[np.ndarray, "..."]) -> Any:
         """Lanes of all iterations, one below the other."""
-        return np.broadcast_to(lanes, (*self.shape, lanes.shape[-1])).reshape(self.iterations, -1)
+        if lanes.shape[:-1] != self.shape:
+            lanes = np.broadcast_to(lanes, (*self.shape, lanes.shape[-1]))
+        return lanes.reshape(self.iterations, -1)
 
     def _require_outermost(self) -> None:
         if self.around:

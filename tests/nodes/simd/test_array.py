@@ -105,13 +105,8 @@ def test_loops_in_loops_leave_the_same_words_and_counts_as_one_by_one(seed, n_ar
     rows, columns = rng.integers(0, 1 << 10, n_around), rng.integers(0, 1 << 10, n_inside)
 
     def program(array):
-        start, total, flagged, around = (
-            loaded(array, values),
-            array.word(n_words=2),
-            array.word(),
-            array.word(),
-        )
-        row, both, last = array.word(), array.word(), array.word()
+        start, total = loaded(array, values), array.word(n_words=2)
+        flagged, around, row, both, last = (array.word() for _ in range(5))
         with array.step("program") as cost:
             for r in array.repeat(n_around):
                 array.add(row, start, rows[r])
