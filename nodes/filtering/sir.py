@@ -6,6 +6,8 @@ likelihoods of all cameras; for one camera it is their single-camera filter.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 from jaxtyping import Float
@@ -78,7 +80,7 @@ def sum_log_likelihoods(
     views: Sequence[View], positions: Float[np.ndarray, "N A"]
 ) -> Float[np.ndarray, " N"]:
     """Adds up log Π P(z | χ) over the cameras, which see independently of each other."""
-    total = np.zeros(len(positions))
-    for view in views:
-        total += view.model.log_likelihoods(view.picture, positions, view.appearance)
-    return total
+    if not views:
+        return np.zeros(len(positions))
+    each = (view.model.log_likelihoods(view.picture, positions, view.appearance) for view in views)
+    return reduce(add, each)
