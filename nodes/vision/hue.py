@@ -39,11 +39,13 @@ def hue_bins(image: UInt8[np.ndarray, "H W 3"], n_bins: int) -> UInt8[np.ndarray
         n_bins: n, at most `MAX_BINS`.
     """
     hsv = cv2.cvtColor(image.astype(np.float32), cv2.COLOR_BGR2HSV)
-    hue, saturation, value = hsv[..., 0], hsv[..., 1], hsv[..., 2]
-    sector = np.empty(hue.shape, np.uint8)
-    np.multiply(hue + np.float32(NUDGE), np.float32((n_bins - 1) / 360), out=sector, casting="unsafe")
+    # one row each: NumPy is quick along the long axis only
+    hue, saturation, value = np.ascontiguousarray(hsv.reshape(-1, 3).T)
+    sector = np.empty(len(hue), np.uint8)
+    hue += np.float32(NUDGE)
+    np.multiply(hue, np.float32((n_bins - 1) / 360), out=sector, casting="unsafe")
     # C = S M is whole, and S is further from the limit than the error of floats
     grey = saturation * value < GREY_CHROMA - 0.5
     grey |= saturation < GREY_SATURATION / FULL_SATURATION
-    np.copyto(sector, n_bins - 1, where=grey, casting="unsafe")
-    return sector
+    np.putmask(sector, grey, n_bins - 1)
+    return sector.reshape(image.shape[:2])
