@@ -55,7 +55,7 @@ def _plain_tables(block: Block) -> UInt8[np.ndarray, "n B 4"]:
     return _tables(block.size, (block.keys, 1))
 
 
-def _tables(n_places: int, *marked: tuple[Integer[np.ndarray, " k"], int]) -> UInt8[np.ndarray, "n B 4"]:
+def _tables(n_places: int, *marked: tuple[Integer[np.ndarray, " _"], int]) -> UInt8[np.ndarray, "n B 4"]:
     """From the number of a pixel to its four marks, for each image; in place i those of the i-th numbers."""
     tables = np.zeros((-(-n_places // PLACES), KINDS, PLACES), np.uint8)
     for numbers, mark in marked:
@@ -67,7 +67,8 @@ def _tables(n_places: int, *marked: tuple[Integer[np.ndarray, " k"], int]) -> UI
 def _table_sums(
     numbers: UInt8[np.ndarray, "h w"], tables: UInt8[np.ndarray, "n B 4"], corners: Int[np.ndarray, "4 N"]
 ) -> Int32[np.ndarray, "n4 N"]:
-    return _box_sums(_marks_of_tables(numbers, tables), len(tables), numbers.shape, corners)
+    sums = _box_sums(_marks_of_tables(numbers, tables), len(tables), numbers.shape, corners)
+    return sums.reshape(-1, corners.shape[1])
 
 
 def _marks_of_tables(
@@ -89,7 +90,7 @@ def inner_rows(begin: int, end: int) -> tuple[int, int]:
 
 def count_channels(
     bins: UInt8[np.ndarray, "C h w"], images: Images, inner: tuple[int, int], corners: Int[np.ndarray, "4 N"]
-) -> Int32[np.ndarray, "n4 N"]:
+) -> Int32[np.ndarray, "n 4 N"]:
     """Counts the codes of three histograms.
 
     Args:
@@ -99,7 +100,7 @@ def count_channels(
         corners: As for `count_block`, in images in which the inner rows are one.
 
     Returns:
-        The counts of the codes, place by place, image by image.
+        The counts of `images.codes`.
     """
     begin, end = inner
     pixels = bins.transpose(1, 2, 0)
@@ -157,7 +158,7 @@ def _box_sums(
     n_images: int,
     shape: tuple[int, ...],
     corners: Int[np.ndarray, "4 N"],
-) -> Int32[np.ndarray, "n4 N"]:
+) -> Int32[np.ndarray, "n 4 N"]:
     """Adds up the marks in each box, of the four places of each image."""
     height, width = shape
     n_boxes = corners.shape[1]
@@ -172,4 +173,4 @@ def _box_sums(
     sums = found.view(np.int32).reshape(n_images, 2, 2, n_boxes * PLACES)
     above = sums[:, :, 1] - sums[:, :, 0]
     total = above[:, 1] - above[:, 0]
-    return total.reshape(n_images, n_boxes, PLACES).swapaxes(1, 2).reshape(n_images * PLACES, n_boxes)
+    return total.reshape(n_images, n_boxes, PLACES).swapaxes(1, 2)

@@ -79,7 +79,7 @@ class PixelBoxes:
                 images = self.book.images[part]
                 inner = inner_rows(rows.held_from - rows.first, rows.held_to - rows.first)
                 corners = self._corners(part, rows, width, max(inner[1] - inner[0] - 1, 0))
-                counts[images.codes.ravel()] = count_channels(of_part, images, inner, corners)
+                counts[images.codes] = count_channels(of_part, images, inner, corners)
         return counts[:n_codes], pixels
 
     def _corners(self, part: int, rows: Rows, width: int, n_left_out: int = 0) -> Int[np.ndarray, "4 N"]:

@@ -38,6 +38,11 @@ class Particles:
         """The weights themselves."""
         return np.exp(self.log_weights)
 
+    @cached_property
+    def effective_sample_size(self) -> float:
+        """1 / Σ ω²: how many equally weighted particles the sample is worth."""
+        return float(1 / (self.weights @ self.weights))
+
 
 def sample_gaussian(
     mean: Float[np.ndarray, " D"],
@@ -100,12 +105,6 @@ def _is_flat(log_factors: Float[np.ndarray, " N"]) -> bool:
     return bool(log_factors[0] == log_factors[-1] and (log_factors == log_factors[0]).all())
 
 
-def effective_sample_size(particles: Particles) -> float:
-    """1 / Σ ω²: how many equally weighted particles the sample is worth."""
-    weights = particles.weights
-    return float(1 / (weights @ weights))
-
-
 def systematic_indices(weights: Float[np.ndarray, " N"], offset: float) -> Int[np.ndarray, " N"]:
     """Systematic resampling: one draw in each of N equal strata, all at the same offset.
 
@@ -146,7 +145,7 @@ def resample_if_degenerate(
 ) -> Particles:
     """Resamples where the effective sample size is below `ess_threshold` times n (Algorithm 1, step 7)."""
     n = len(particles.log_weights)
-    if effective_sample_size(particles) >= ess_threshold * n:
+    if particles.effective_sample_size >= ess_threshold * n:
         return particles
     return resample(particles, float(rng.random()), n_threads)
 

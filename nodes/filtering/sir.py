@@ -16,7 +16,6 @@ from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.motion import MotionModel, predict
 from nodes.filtering.particles import (
     Particles,
-    effective_sample_size,
     resample_if_degenerate,
     reweight,
 )
@@ -70,7 +69,7 @@ def sir_step(
     info = SirInfo(
         moments(predicted.states, predicted.weights),
         moments(posterior.states, posterior.weights),
-        effective_sample_size(posterior),
+        posterior.effective_sample_size,
     )
     # resample
     return resample_if_degenerate(posterior, ess_threshold, rng, n_threads), info

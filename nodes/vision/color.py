@@ -129,7 +129,8 @@ def quantize(
         bits = n.bit_length() - 1
         if options.space == "joint_rgb":
             return _joint_bits(image, bits)[None]
-        rgb = np.right_shift(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), 8 - bits)
+        rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+        np.right_shift(rgb, 8 - bits, out=rgb)
     else:
         tables = _tables(options, gain).astype(np.uint8 if options.n_bins <= 256 else np.uint16)
         values = cv2.LUT(image, np.ascontiguousarray(tables.T)[None])
