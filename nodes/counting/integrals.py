@@ -13,7 +13,9 @@ from jaxtyping import Int, Int32, Integer, UInt8
 from nodes.counting.codebook import KINDS, PLACES, Block, Images
 
 RARE, COMMON, LOW_BITS = 1, 128, 7
-"""Marks of two codes in one place: a sum's lower bits count the rarer one, the others the commoner one."""
+"""Marks of two codes in one place: a sum's lower bits count the rarer one, the others the commoner one.
+
+The upper 25 are enough for boxes of 33 million pixels."""
 JOINED_ROWS = 8
 """Rows of pixels that are compared at once: NumPy takes its time between one piece of memory and the next."""
 MOST_ADDED_UP = 255 // JOINED_ROWS * JOINED_ROWS
@@ -35,7 +37,7 @@ def count_block(
     numbers = block.numbers(bins)
     if block.size <= 2 * PLACES:
         return _table_sums(numbers, _plain_tables(block), corners)[: block.size]
-    # What does not occur here at all needs no place, and what seldom does shares one.
+    # What does not occur here at all needs no place, and what does seldom shares one with what does often.
     n_times = cv2.calcHist([numbers], [0], None, [KINDS], [0, KINDS])[block.keys]
     order = n_times.argsort()
     absent, rare = n_times[order].searchsorted((1, COMMON)).tolist()

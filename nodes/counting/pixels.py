@@ -10,7 +10,7 @@ from jaxtyping import Float, Int, Integer
 from nodes.counting.codebook import Codebook
 from nodes.counting.integrals import count_block, count_channels, inner_rows
 
-BOX_COST, PIXEL_COST = 3000, 2
+BOX_COST, PIXEL_COST = 30_000, 10
 """What one box costs directly, and each of its pixels, in units of one colour in one pixel of an integral."""
 
 

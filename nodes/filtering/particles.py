@@ -12,8 +12,8 @@ from jaxtyping import Float, Int
 
 from nodes.threads import in_shares
 
-LEAST_OUTPUTS = 15_000
-"""New particles that a thread draws at least; for fewer it is not worth its start."""
+LEAST_OUTPUTS = 75_000
+"""New particles that a thread draws at least; for fewer it is hardly worth its start."""
 
 
 @dataclass(frozen=True, eq=False)
