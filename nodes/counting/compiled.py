@@ -12,8 +12,7 @@ from nodes.counting.codebook import Codebook
 from nodes.counting.grid import rows_of_parts, sample_positions
 
 _int32, _pointer = ctypes.c_int32, ctypes.c_void_p
-ROOTS = np.sqrt(np.arange(16384.0))
-"""Of counts; looking up is faster than working out."""
+_ROOTS = np.sqrt(np.arange(16384.0))
 
 
 class _Picture(ctypes.Structure):
@@ -108,8 +107,8 @@ def compile_reference(
     first = np.searchsorted(book.part, np.arange(n_parts + 1)).astype(np.int32)
     structure = _Reference(
         *(n_parts, len(book.part), n_joints, n_channels),
-        *(array.ctypes.data for array in (first, edges, codes, scale, perfect, ROOTS)),
-        len(ROOTS),
+        *(array.ctypes.data for array in (first, edges, codes, scale, perfect, _ROOTS)),
+        len(_ROOTS),
     )
     return Compiled(book, structure, (first, edges, codes, scale, perfect))
 

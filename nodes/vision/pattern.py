@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from nodes.counting.codebook import Codebook, codebook
-from nodes.counting.compiled import ROOTS, Compiled, compile_reference
+from nodes.counting.compiled import Compiled, compile_reference
 from nodes.vision.appearance import Appearance
 from nodes.vision.color import ColorOptions
 
@@ -72,18 +72,11 @@ def coefficients(
     counts: Int[np.ndarray, "N K"], pixels: Int[np.ndarray, "N P"], pattern: Pattern
 ) -> Float[np.ndarray, " N"]:
     """Sums up Σ_p w_p Σ_b ω √(h q) of each box, h = counts / pixels."""
-    terms = _roots(counts.T)
+    terms = np.sqrt(counts.T, dtype=float)
     terms *= pattern.scale[:, None]
     roots = np.sqrt(np.maximum(pixels.T, 1))
     of_parts = (_sum_in_order(terms[first:last]) for first, last in pairwise(pattern.ends))
     return reduce(add, (of_part / root for of_part, root in zip(of_parts, roots, strict=True)))
-
-
-def _roots(counts: Int[np.ndarray, "K N"]) -> Float[np.ndarray, "K N"]:
-    try:
-        return ROOTS.take(counts)
-    except IndexError:
-        return np.sqrt(counts, dtype=float)
 
 
 def _sum_in_order(terms: Float[np.ndarray, "k N"]) -> Float[np.ndarray, " N"]:
