@@ -51,6 +51,10 @@ class Camera:
         return float(real[real > 0].min(initial=np.inf))
 
     @cached_property
+    def _focal_lengths(self) -> Float[np.ndarray, "2 1"]:
+        return self.K.diagonal()[:2, None]
+
+    @cached_property
     def _distorts(self) -> bool:
         return bool(self.distortion.any())
 
@@ -69,11 +73,12 @@ class Camera:
         seen = self.R @ points.T
         seen += self.t[:, None]
         depth = seen[2]
+        pictured = depth > 1e-6
         x, y = rays = seen[:2] / np.maximum(depth, 1e-6)
-        r2 = x * x + y * y
-        pictured = (depth > 1e-6) & (r2 < self._radius2_limit)
         if self._distorts:
             k1, k2, p1, p2, k3 = self.distortion
+            r2 = x * x + y * y
+            pictured &= r2 < self._radius2_limit
             radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
             x, y = rays = np.stack(
                 (
@@ -82,10 +87,12 @@ class Camera:
                 )
             )
         # u = f_x x + s y + c_x, v = f_y y + c_y
-        pixels = rays * self.K.diagonal()[:2, None]
-        pixels[0] += self.K[0, 1] * y
+        pixels = rays * self._focal_lengths
+        if self.K[0, 1]:
+            pixels[0] += self.K[0, 1] * y
         pixels += self.K[:2, 2:]
-        np.copyto(pixels, np.nan, where=~pictured)
+        if not pictured.all():
+            np.copyto(pixels, np.nan, where=~pictured)
         return pixels.T, depth
 
     def contains(self, pixels: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, " N"]:

@@ -1,6 +1,7 @@
 """What every estimator of a run is told: the target and its start, the options, the run's name and seed."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -50,7 +51,7 @@ class Start:
         return Moments(self.mean, np.diag(self.deviation**2))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class TrackingSetup:
     """What a smart camera and the central node have in common.
 
@@ -72,7 +73,7 @@ class TrackingSetup:
     filter: FilterOptions
     fusion: FusionOptions
 
-    @property
+    @cached_property
     def motion(self) -> MotionModel:
         """The state model at the run's frame rate."""
         return motion_model(self.target.n_axes, 1 / self.rate_hz, self.filter.dynamics)

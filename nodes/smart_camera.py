@@ -18,7 +18,7 @@ from nodes.estimator import SirEstimator
 from nodes.filtering.fusion import fuse, is_density, left_of, pack, propagate, unpack
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.local import LocalResult, local_filter
-from nodes.filtering.particles import Particles, effective_sample_size, resample_if_degenerate
+from nodes.filtering.particles import Particles, resample_if_degenerate
 from nodes.filtering.sighting import Sighting
 from nodes.frame import FrameInProgress, is_new
 from nodes.preview import preview
@@ -245,7 +245,7 @@ class SmartCamera:
         # estimate
         estimate = moments(posterior.states, posterior.weights)
         self._estimate = estimate
-        ess = effective_sample_size(posterior)
+        ess = posterior.effective_sample_size
         prior = moments(predicted.states, predicted.weights)
         self._sighting = self._sighting.after(left_of(prior, fused))
         # resample

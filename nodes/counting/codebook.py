@@ -3,18 +3,21 @@
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, Integer, UInt8
 
 MAX_BLOCK = 252
 """Codes in a block, so that they and a mark for all others fit a byte, in whole words of four."""
-OTHER = 255
-"""The mark of all other colours in a block."""
+KINDS = 256
+"""Numbers that a byte can be."""
+OTHER = KINDS - 1
+"""The number of all other colours in a block."""
 PLACES = 4
 """Codes in an integral image: OpenCV has a fast path for four channels, and one look-up serves them all."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Block:
     """Codes of one part and channel that are counted together.
 
@@ -32,25 +35,39 @@ class Block:
     bins: Int[np.ndarray, " k"]
     table: UInt8[np.ndarray, " B"]
 
-    @property
+    @cached_property
     def size(self) -> int:
         """How many codes it has."""
         return self.codes.stop - self.codes.start
 
+    @cached_property
+    def keys(self) -> Int[np.ndarray, " k"]:
+        """What `numbers` calls its codes."""
+        return self.bins if len(self.table) < KINDS else np.arange(self.size)
+
+    def numbers(self, bins: Integer[np.ndarray, "h w"]) -> UInt8[np.ndarray, "h w"]:
+        """A byte for each pixel: its bin or, where bins do not fit, its code's number within the block."""
+        if len(self.table) < KINDS:
+            return bins.astype(np.uint8, copy=False)
+        return np.asarray(cv2.LUT(bins.astype(np.uint16, copy=False), self._long_table), dtype=np.uint8)
+
+    @cached_property
+    def _long_table(self) -> UInt8[np.ndarray, " L"]:
+        """The table as `cv2.LUT` wants it, for anything that two bytes can be."""
+        return np.pad(self.table, (0, (1 << 16) - len(self.table)), constant_values=OTHER)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Images:
-    """What integral images of four codes each count: a code where a pixel's number is equal to the image's.
+    """What integral images of four codes each count, a code of each channel and a place to spare.
 
     Attributes:
-        numbers: Of each image; `OTHER` where a place has no code.
+        numbers: Of each image, the bins that are counted; `OTHER` where a place has no code.
         codes: Of each image; K where a place has none.
-        block: The codes' block if all are of one channel, None if each place is another channel's.
     """
 
     numbers: UInt8[np.ndarray, "n 4"]
     codes: Int[np.ndarray, "n 4"]
-    block: Block | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,35 +102,25 @@ class Codebook:
         )
 
     @cached_property
-    def images(self) -> tuple[tuple[Images, ...], ...]:
-        """The same for counting from integral images, for each part."""
-        n_parts, _, n_bins = self.codes.shape
-        of_parts = [[block for block in self.blocks if block.part == part] for part in range(n_parts)]
-        n_codes, by_bin = len(self.part), n_bins <= OTHER
-        if self.n_channels > 1:
-            return tuple((_images_of_channels(blocks, n_codes),) if blocks else () for blocks in of_parts)
-        return tuple(
-            tuple(_images_of_block(block, n_codes, by_bin=by_bin) for block in blocks) for blocks in of_parts
-        )
+    def blocks_of(self) -> tuple[tuple[Block, ...], ...]:
+        """The blocks of each part."""
+        parts = range(len(self.part_heights))
+        return tuple(tuple(block for block in self.blocks if block.part == part) for part in parts)
+
+    @cached_property
+    def images(self) -> tuple[Images, ...]:
+        """The codes of each part's three channels."""
+        return tuple(_images_of_channels(blocks, len(self.part)) for blocks in self.blocks_of)
 
 
-def _images_of_channels(blocks: list[Block], n_codes: int) -> Images:
-    """Of three channels: a pixel's numbers are its bins, and an image has a code of each channel."""
-    size = max(block.size for block in blocks)
+def _images_of_channels(blocks: tuple[Block, ...], n_codes: int) -> Images:
+    """An image has a code of each channel."""
+    size = max((block.size for block in blocks), default=0)
     numbers, codes = np.full((size, PLACES), OTHER, np.uint8), np.full((size, PLACES), n_codes)
     for block in blocks:
         numbers[: block.size, block.channel] = block.bins
         codes[: block.size, block.channel] = np.arange(block.codes.start, block.codes.stop)
-    return Images(numbers, codes, None)
-
-
-def _images_of_block(block: Block, n_codes: int, *, by_bin: bool) -> Images:
-    """Of one channel: a pixel's number is its bin or, where those do not fit a byte, its code's place."""
-    n_places = -(-block.size // PLACES) * PLACES
-    numbers, codes = np.full(n_places, OTHER, np.uint8), np.full(n_places, n_codes)
-    numbers[: block.size] = block.bins if by_bin else np.arange(block.size)
-    codes[: block.size] = np.arange(block.codes.start, block.codes.stop)
-    return Images(numbers.reshape(-1, PLACES), codes.reshape(-1, PLACES), block)
+    return Images(numbers, codes)
 
 
 def _block(part: int, channel: int, codes: Integer[np.ndarray, " B"], n_codes: int, first: int) -> Block:

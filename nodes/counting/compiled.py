@@ -185,29 +185,34 @@ def _run(
     grid: tuple[int, int] | None,
     kernel: str,
 ) -> UInt8[np.ndarray, " bytes"]:
-    """Distances, counts and pixels one after the other, in one array: asking for its address takes time."""
-    n, book = len(boxes), reference.book
+    """Distances, counts and pixels one after the other, in one array: asking for its address takes time.
+
+    What it is told, the boxes, stands before them.
+    """
+    (n, sides), book = boxes.shape, reference.book
     if image.strides[1:] != (3, 1):
         image = np.ascontiguousarray(image)
-    boxes = np.ascontiguousarray(boxes)
-    at_counts, at_pixels = 8 * n, 8 * n + 4 * n * len(book.part)
-    found = np.zeros(at_pixels + 4 * n * len(book.part_heights), np.uint8)
+    at_found = boxes.itemsize * sides * n
+    at_counts = at_found + 8 * n
+    at_pixels = at_counts + 4 * n * len(book.part)
+    memory = np.zeros(at_pixels + 4 * n * len(book.part_heights), np.uint8)
+    memory[:at_found].view(float).reshape(n, sides)[:] = boxes
     samples, _kept = _samples(grid, kernel, book.part_heights)
     picture = _Picture(
         *(_address(image), image.strides[0], *image.shape[:2]),
         *(coding.address, coding.hue_bins, *coding.grey),
     )
-    address = _address(found)
+    address = _address(memory)
     failed = load_kernel().dcpf_count(
         *(ctypes.byref(picture), ctypes.byref(reference.structure), ctypes.byref(samples)),
-        *(_pointer(_address(boxes)), _int32(n)),
-        *(_pointer(address), _pointer(address + at_counts), _pointer(address + at_pixels)),
+        *(_pointer(address), _int32(n), _pointer(address + at_found)),
+        *(_pointer(address + at_counts), _pointer(address + at_pixels)),
     )
     if failed:
         raise MemoryError(
             f"the boxes cover too much of a picture of {image.shape[1]} x {image.shape[0]} pixels"
         )
-    return found
+    return memory[at_found:]
 
 
 def _address(array: np.ndarray) -> int:

@@ -3,18 +3,20 @@
 Source: Arulampalam et al., "A tutorial on particle filters" (2002), Algorithms 2 and 4.
 """
 
+import math
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from nodes.threads import in_shares
 
-LEAST_OUTPUTS = 15_000
-"""New particles that a thread draws at least; for fewer it is not worth its start."""
+LEAST_OUTPUTS = 75_000
+"""New particles that a thread draws at least; for fewer it is hardly worth its start."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Particles:
     """A weighted sample of the target's state.
 
@@ -31,10 +33,15 @@ class Particles:
         """The position part of the states."""
         return self.states[:, : self.states.shape[1] // 2]
 
-    @property
+    @cached_property
     def weights(self) -> Float[np.ndarray, " N"]:
         """The weights themselves."""
         return np.exp(self.log_weights)
+
+    @cached_property
+    def effective_sample_size(self) -> float:
+        """1 / Σ ω²: how many equally weighted particles the sample is worth."""
+        return float(1 / (self.weights @ self.weights))
 
 
 def sample_gaussian(
@@ -61,9 +68,12 @@ def sample_moments(
     return Particles(mean + noise @ V.T, uniform_log_weights(n_particles))
 
 
+@lru_cache(maxsize=8)  # every frame's resampling asks for them
 def uniform_log_weights(n_particles: int) -> Float[np.ndarray, " N"]:
-    """log(1/n) for each of n particles."""
-    return np.full(n_particles, -np.log(n_particles))
+    """log(1/n) for each of n particles; not to be written to."""
+    log_weights = np.full(n_particles, -np.log(n_particles))
+    log_weights.setflags(write=False)
+    return log_weights
 
 
 def normalize(log_weights: Float[np.ndarray, " N"]) -> tuple[Float[np.ndarray, " N"], float]:
@@ -74,7 +84,7 @@ def normalize(log_weights: Float[np.ndarray, " N"]) -> tuple[Float[np.ndarray, "
         reweighting). Where every weight is zero, nothing was learnt: uniform weights and -inf.
     """
     peak = log_weights.max()
-    if not np.isfinite(peak):
+    if not math.isfinite(peak):
         return uniform_log_weights(len(log_weights)), -np.inf
     log_sum = peak + np.log(np.exp(log_weights - peak).sum())
     return log_weights - log_sum, float(log_sum)
@@ -83,17 +93,16 @@ def normalize(log_weights: Float[np.ndarray, " N"]) -> tuple[Float[np.ndarray, "
 def reweight(particles: Particles, log_factors: Float[np.ndarray, " N"]) -> Particles:
     """Multiplies the weights by factors given as logarithms, and normalises (Eq. 12)."""
     # A flat likelihood says nothing, and changes nothing to the last bit.
-    if (log_factors == log_factors[0]).all():
+    if _is_flat(log_factors):
         return particles
     # ω(k) ∝ ω(k-1) · factor
     log_weights, _ = normalize(particles.log_weights + log_factors)
     return Particles(particles.states, log_weights)
 
 
-def effective_sample_size(particles: Particles) -> float:
-    """1 / Σ ω²: how many equally weighted particles the sample is worth."""
-    weights = particles.weights
-    return float(1 / (weights @ weights))
+def _is_flat(log_factors: Float[np.ndarray, " N"]) -> bool:
+    # two numbers mostly tell
+    return bool(log_factors[0] == log_factors[-1] and (log_factors == log_factors[0]).all())
 
 
 def systematic_indices(weights: Float[np.ndarray, " N"], offset: float) -> Int[np.ndarray, " N"]:
@@ -115,7 +124,9 @@ def _upper_edges(weights: Float[np.ndarray, " N"]) -> Float[np.ndarray, " K"]:
 
     That one takes all above, and with it the rounding error of the sum.
     """
-    last = len(weights) - 1 - int((weights[::-1] > 0).argmax())
+    last = len(weights) - 1
+    if weights[last] == 0:
+        last -= int((weights[::-1] > 0).argmax())
     return weights[:last].cumsum()
 
 
@@ -134,7 +145,7 @@ def resample_if_degenerate(
 ) -> Particles:
     """Resamples where the effective sample size is below `ess_threshold` times n (Algorithm 1, step 7)."""
     n = len(particles.log_weights)
-    if effective_sample_size(particles) >= ess_threshold * n:
+    if particles.effective_sample_size >= ess_threshold * n:
         return particles
     return resample(particles, float(rng.random()), n_threads)
 

@@ -6,6 +6,8 @@ likelihoods of all cameras; for one camera it is their single-camera filter.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 from jaxtyping import Float
@@ -14,7 +16,6 @@ from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.motion import MotionModel, predict
 from nodes.filtering.particles import (
     Particles,
-    effective_sample_size,
     resample_if_degenerate,
     reweight,
 )
@@ -68,7 +69,7 @@ def sir_step(
     info = SirInfo(
         moments(predicted.states, predicted.weights),
         moments(posterior.states, posterior.weights),
-        effective_sample_size(posterior),
+        posterior.effective_sample_size,
     )
     # resample
     return resample_if_degenerate(posterior, ess_threshold, rng, n_threads), info
@@ -78,7 +79,7 @@ def sum_log_likelihoods(
     views: Sequence[View], positions: Float[np.ndarray, "N A"]
 ) -> Float[np.ndarray, " N"]:
     """Adds up log Π P(z | χ) over the cameras, which see independently of each other."""
-    total = np.zeros(len(positions))
-    for view in views:
-        total += view.model.log_likelihoods(view.picture, positions, view.appearance)
-    return total
+    if not views:
+        return np.zeros(len(positions))
+    each = (view.model.log_likelihoods(view.picture, positions, view.appearance) for view in views)
+    return reduce(add, each)

@@ -10,7 +10,7 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int, Integer, UInt8
+from jaxtyping import Float, Int, Integer, UInt8, UInt16
 from pydantic import Field, model_validator
 
 from network.options import Options
@@ -21,6 +21,7 @@ GAIN_GRID_PX = 24
 """Every 24th pixel of every 24th line is enough for a median."""
 MAX_RGB_BINS = 16
 """Most bins along a channel of RGB."""
+NO_GAIN = [1.0, 1.0, 1.0]
 _VALUES = np.arange(256)
 _NO_TABLES = np.zeros((3, 256), np.uint16)
 
@@ -123,33 +124,38 @@ def quantize(
     if options.space == "hue":
         return hue_bins(without_gain(image, gain), options.n_bins)[None]
     n = options.bins_per_channel
-    if 256 % n == 0 and (gain == 1.0).all():
+    if 256 % n == 0 and gain.tolist() == NO_GAIN:
         # floor(n · value / 256) without a table: the first bits of each channel
         bits = n.bit_length() - 1
         if options.space == "joint_rgb":
             return _joint_bits(image, bits)[None]
-        rgba = cv2.cvtColor(image, cv2.COLOR_BGR2RGBA)
-        rgb = np.right_shift(rgba, 8 - bits, out=rgba)
+        rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+        np.right_shift(rgb, 8 - bits, out=rgb)
     else:
         tables = _tables(options, gain).astype(np.uint8 if options.n_bins <= 256 else np.uint16)
         values = cv2.LUT(image, np.ascontiguousarray(tables.T)[None])
         if options.space == "joint_rgb":
             blue, green, red = cv2.split(values)
             return (red + green + blue)[None]
-        rgb = cv2.cvtColor(values, cv2.COLOR_BGR2RGBA)
-    # side by side in memory, four bytes a pixel, as counting wants them
-    return np.moveaxis(rgb, -1, 0)[:3]
+        rgb = cv2.cvtColor(values, cv2.COLOR_BGR2RGB)
+    # side by side in memory, as counting wants them
+    return rgb.transpose(2, 0, 1)
 
 
 def _joint_bits(image: UInt8[np.ndarray, "H W 3"], bits: int) -> Integer[np.ndarray, "H W"]:
     """The first bits of red, green and blue one after the other, at most 4 of each."""
     # OpenCV cuts red to 5 bits, green to 6 and blue to 5, in a word of 16
     words = cv2.cvtColor(image, cv2.COLOR_BGR2BGR565).view(np.uint16)[..., 0]
+    return np.asarray(cv2.LUT(words, _joint_of_words(bits)))
+
+
+@lru_cache
+def _joint_of_words(bits: int) -> UInt8[np.ndarray, " 65536"] | UInt16[np.ndarray, " 65536"]:
+    words, low = np.arange(1 << 16), (1 << bits) - 1
     joint = (words >> (16 - bits)) << (2 * bits)
-    low = (1 << bits) - 1
     joint |= ((words >> (11 - bits)) & low) << bits
     joint |= (words >> (5 - bits)) & low
-    return joint if bits > 2 else joint.astype(np.uint8)
+    return joint.astype(np.uint16 if bits > 2 else np.uint8)
 
 
 def _tables(options: ColorOptions, gain: Float[np.ndarray, " 3"]) -> Int[np.ndarray, "3 256"]:
@@ -184,7 +190,7 @@ def without_gain(
     image: UInt8[np.ndarray, "H W 3"], gain: Float[np.ndarray, " 3"]
 ) -> UInt8[np.ndarray, "H W 3"]:
     """The picture with each channel's gain divided out, rounded to grey levels."""
-    if (gain == 1.0).all():
+    if gain.tolist() == NO_GAIN:
         return image
     levels = np.minimum(np.rint(_VALUES / gain[:, None]), 255).astype(np.uint8)
     return np.asarray(cv2.LUT(image, np.ascontiguousarray(levels.T)[None]), dtype=np.uint8)

@@ -34,30 +34,30 @@ class LikelihoodOptions(Options):
     """d₀²/σ² (background)."""
 
 
-def log_likelihoods(
-    squared_distance: Float[np.ndarray, " N"],
+def log_gaussian(squared_distance: Float[np.ndarray, " N"], variance: float) -> Float[np.ndarray, " N"]:
+    """ℓ of each box, taken literally: -d²/2σ²."""
+    return squared_distance / (-2 * variance)
+
+
+def with_miss_floor(
+    log_match: Float[np.ndarray, " N"],
     visible: Float[np.ndarray, " N"],
     miss_distance: float,
     variance: float,
     min_visible: float,
-    options: LikelihoodOptions,
 ) -> Float[np.ndarray, " N"]:
-    """ℓ of each box.
+    """ℓ of each box, never below that of a missed target.
 
     Args:
-        squared_distance: d² to the reference.
+        log_match: Taken literally.
         visible: Part of the box inside the picture.
         miss_distance: d₀².
         variance: σ².
         min_visible: Below this part inside the picture the camera has nothing to say.
-        options: The form.
     """
-    match_term = -squared_distance / (2 * variance)
-    if options.form == "literal":
-        return match_term
     # ℓ = log(exp(-d²/2σ²) + exp(-d₀²/2σ²)), and the second alone where the box is hardly visible
     floor = -miss_distance / (2 * variance)
-    return np.where(visible < min_visible, floor, np.logaddexp(match_term, floor))
+    return np.where(visible < min_visible, floor, np.logaddexp(log_match, floor))
 
 
 def background_constants(

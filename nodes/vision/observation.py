@@ -35,7 +35,12 @@ from nodes.vision.color import (
     quantize,
     without_gain,
 )
-from nodes.vision.likelihood import LikelihoodOptions, background_constants, log_likelihoods
+from nodes.vision.likelihood import (
+    LikelihoodOptions,
+    background_constants,
+    log_gaussian,
+    with_miss_floor,
+)
 from nodes.vision.pattern import Pattern, coefficients, full_codebook, pattern_of, squared_distances
 from nodes.vision.target import TargetOptions, project_boxes, visible_fraction
 
@@ -125,22 +130,12 @@ class ObservationModel:
         """Evaluates log P(z | χ) at each position; flat while the target's looks are not known."""
         if appearance is None:
             return np.zeros(len(positions))
-        distance, visible = self.distances(picture, positions, appearance)
-        return log_likelihoods(
-            distance,
-            visible,
-            appearance.miss_distance,
-            appearance.variance,
-            self.options.sampling.min_visible,
-            self.options.likelihood,
-        )
-
-    def distances(
-        self, picture: Picture, positions: Float[np.ndarray, "N A"], appearance: Appearance
-    ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
-        """d² to the reference and visible part of the box at each position."""
         boxes = project_boxes(positions, self.target, self.camera)
-        return self.box_distances(picture, boxes, appearance), visible_fraction(boxes, self.camera)
+        log_match = log_gaussian(self.box_distances(picture, boxes, appearance), appearance.variance)
+        if self.options.likelihood.form == "literal":
+            return log_match
+        visible, min_visible = visible_fraction(boxes, self.camera), self.options.sampling.min_visible
+        return with_miss_floor(log_match, visible, appearance.miss_distance, appearance.variance, min_visible)
 
     def sight(self, picture: Picture, position: Float[np.ndarray, " A"], appearance: Appearance) -> Sight:
         """What the target's box at a position shows."""

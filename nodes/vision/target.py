@@ -1,5 +1,6 @@
 """The target: the space that it moves in, its size, its start, and the box that it fills in a picture."""
 
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -11,7 +12,7 @@ from nodes.camera import Camera
 
 MIN_ASPECT = 0.8
 """Least height of a box in widths: what is left of a person seen from straight above."""
-_TRUNK_ASPECT = np.array([1.0, MIN_ASPECT])
+_TRUNK_ASPECT = np.array([[1.0], [MIN_ASPECT]])
 
 
 class StartOptions(Options):
@@ -107,10 +108,14 @@ def project_boxes(
         pictured from there, or would be less than two pixels high.
     """
     # One row a coordinate, and the boxes' sides likewise: NumPy is quick along the long axis only.
-    if target.size_px is not None:
-        middle, half = np.add(positions.T, 0.5, order="C"), 0.5 * np.array(target.size_px)[:, None]
-        return np.concatenate((middle - half, middle + half)).T
     n, n_axes = positions.shape
+    boxes = np.empty((4, n))
+    if target.size_px is not None:
+        width, height = target.size_px
+        middle, half = np.add(positions.T, 0.5, order="C"), _column(width / 2, height / 2)
+        np.subtract(middle, half, out=boxes[:2])
+        np.add(middle, half, out=boxes[2:])
+        return boxes.T
     body = np.empty((3, 2, n))
     body[:n_axes] = positions.T[:, None]
     foot, head = body[2]
@@ -121,21 +126,37 @@ def project_boxes(
     np.add(foot, target.height, out=head)
     pixels, depths = camera.project(body.reshape(3, 2 * n).T)
     low, high = pixels.T[:, :n], pixels.T[:, n:]
-    middle = (low + high) / 2 + 0.5
+    middle = low + high
+    middle /= 2
+    middle += 0.5
     # A slanted or rolled view shortens the body but not its thickness: a box is at least as wide as it,
     # and nearly as high.
-    trunk = 0.5 * camera.K[0, 0] * target.width / np.maximum((depths[:n] + depths[n:]) / 2, 1e-6)
-    half = np.maximum(0.5 * np.abs(low - high), trunk * _TRUNK_ASPECT[:, None])
-    boxes = np.concatenate((middle - half, middle + half))
-    np.copyto(boxes, np.nan, where=~(half[1] > 1.0))
+    distance = np.maximum((depths[:n] + depths[n:]) / 2, 1e-6)
+    half = low - high
+    np.abs(half, out=half)
+    half *= 0.5
+    trunk = float(0.5 * camera.K[0, 0] * target.width) / distance
+    np.maximum(half, trunk * _TRUNK_ASPECT, out=half)
+    np.subtract(middle, half, out=boxes[:2])
+    np.add(middle, half, out=boxes[2:])
+    pictured = half[1] > 1.0
+    if not pictured.all():
+        np.copyto(boxes, np.nan, where=~pictured)
     return boxes.T
+
+
+@lru_cache
+def _column(x: float, y: float) -> Float[np.ndarray, "2 1"]:
+    return np.array([[x], [y]])
 
 
 def visible_fraction(boxes: Float[np.ndarray, "N 4"], camera: Camera) -> Float[np.ndarray, " N"]:
     """The part of each box that lies inside the picture, 0 to 1."""
     low, high = boxes.T[:2], boxes.T[2:]
-    size_px = np.array([[camera.width_px], [camera.height_px]])
-    width, height = np.maximum(np.minimum(high, size_px) - np.maximum(low, 0.0), 0.0)
-    whole_width, whole_height = high - low
-    fraction = width * height / (whole_width * whole_height)
-    return np.fmax(fraction, 0.0)  # of a box that cannot be pictured, NaN, nothing
+    inside = np.minimum(high, _column(float(camera.width_px), float(camera.height_px)))
+    inside -= np.maximum(low, 0.0)
+    np.maximum(inside, 0.0, out=inside)
+    whole = high - low
+    fraction = inside[0] * inside[1]
+    fraction /= whole[0] * whole[1]
+    return np.fmax(fraction, 0.0, out=fraction)  # of a box that cannot be pictured, NaN, nothing

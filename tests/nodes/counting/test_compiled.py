@@ -1,11 +1,13 @@
 """The compiled kernel against the one in NumPy, count by count; that one is held against brute force."""
 
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodes.counting import build
+from nodes.counting import build, pixels
 from nodes.counting.build import KernelError, load_kernel
 from nodes.counting.codebook import codebook
 from nodes.counting.compiled import compile_reference, counts_compiled, distances_compiled
@@ -14,7 +16,7 @@ from nodes.vision.color import ColorOptions, coding, quantize
 from nodes.vision.pattern import Pattern, coefficients, squared_distances
 
 HEIGHT, WIDTH = 30, 40
-BOX_COST_OF_NONE, BOX_COST_OF_ALL = 10**9, -(10**9)
+BOX_COSTS = [10**9, -(10**9)]
 """What a box costs directly: integral images are always less, or never."""
 
 
@@ -60,8 +62,9 @@ def boxes_of(draw):
     st.sampled_from([(1.0,), (0.2, 0.5, 0.3)]),
     st.sampled_from([None, (15, 15), (4, 9)]),
     st.sampled_from([0.0, 0.1, 1.0]),
+    st.sampled_from(BOX_COSTS),
 )
-def test_counts_are_equal_to_the_last_one(seed, boxes, colors, parts, grid, share):
+def test_counts_are_equal_to_the_last_one(seed, boxes, colors, parts, grid, share, box_cost):
     rng = np.random.default_rng(seed)
     space, n_bins = colors
     options = ColorOptions(space=space, bins_per_channel=n_bins, parts=parts, part_weights=parts)
@@ -71,16 +74,17 @@ def test_counts_are_equal_to_the_last_one(seed, boxes, colors, parts, grid, shar
     scale, perfect = rng.random(len(book.part)), rng.random(len(parts))
     sampling = SamplingOptions(grid=grid, kernel="epanechnikov")
     bins = quantize(image, options, gain)
-    expected, in_parts = count(bins, boxes, book, sampling)
+    with patch.object(pixels, "BOX_COST", box_cost):
+        expected, in_parts = count(bins, boxes, book, sampling)
     reference = compile_reference(book, scale, perfect)
     asked = image, coding(options, gain), boxes, reference, grid, sampling.kernel
-    counts, pixels = counts_compiled(*asked)
+    counts, found = counts_compiled(*asked)
     np.testing.assert_array_equal(counts, expected)
-    np.testing.assert_array_equal(pixels, in_parts)
+    np.testing.assert_array_equal(found, in_parts)
     pattern = Pattern(
         book, scale, tuple(np.searchsorted(book.part, np.arange(len(parts) + 1)).tolist()), perfect
     )
-    distances = squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
+    distances = squared_distances(coefficients(counts, found, pattern), found, pattern)
     np.testing.assert_allclose(distances_compiled(*asked), distances, atol=1e-12)
 
 

@@ -43,7 +43,7 @@ def by_opencv(bins, box, part_top, part_bottom, n_bins):
     """The histogram of the pixels whose centres lie in a part of a box; OpenCV 5 gives it one axis."""
     left, top, right, bottom = box
     high, low = top + part_top * (bottom - top), top + part_bottom * (bottom - top)
-    columns, rows = np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5
+    rows, columns = (np.arange(n) + 0.5 for n in bins.shape)
     inside = np.outer((rows > high) & (rows <= low), (columns > left) & (columns <= right))
     mask = inside.astype(np.uint8)
     return cv2.calcHist([bins], [0], mask, [n_bins], [0, n_bins]).reshape(-1), np.count_nonzero(mask)
@@ -57,6 +57,25 @@ def test_counting_every_pixel_agrees_with_opencv_count_by_count(n_channels, n_bi
     counts = counts.reshape(len(BOXES), len(parts), n_channels, n_bins)
     edges = [0, *np.cumsum(parts)]
     for box, of_box, in_box in zip(BOXES, counts, pixels, strict=True):
+        for part, (top, bottom) in enumerate(pairwise(edges)):
+            for channel in range(n_channels):
+                histogram, n_pixels = by_opencv(bins[channel], box, top, bottom, n_bins)
+                np.testing.assert_array_equal(of_box[part, channel], histogram)
+                assert in_box[part] == n_pixels
+
+
+@pytest.mark.parametrize(("n_channels", "n_bins"), [(1, 8), (1, 200), (1, 300), (3, 8)])
+@pytest.mark.parametrize("parts", [(1.0,), (0.9, 0.1)])
+def test_rare_colours_and_rows_that_all_boxes_hold_are_counted_like_any(n_channels, n_bins, parts):
+    rng = np.random.default_rng(4)
+    # a few colours have nearly all pixels, many have some, and some have none
+    shares = rng.dirichlet(np.full(n_bins, 0.1))
+    bins = rng.choice(n_bins, (n_channels, 300, 40), p=shares).astype(np.min_scalar_type(n_bins))
+    low, high = rng.uniform([-5, -5], [20, 12], (80, 2)), rng.uniform([20, 285], [45, 305], (80, 2))
+    boxes, edges = np.hstack([low, high]), [0, *np.cumsum(parts)]
+    counts, pixels = count(bins, boxes, full_book(n_channels, n_bins, parts), EVERY_PIXEL)
+    counts = counts.reshape(len(boxes), len(parts), n_channels, n_bins)
+    for box, of_box, in_box in zip(boxes, counts, pixels, strict=True):
         for part, (top, bottom) in enumerate(pairwise(edges)):
             for channel in range(n_channels):
                 histogram, n_pixels = by_opencv(bins[channel], box, top, bottom, n_bins)

@@ -9,7 +9,6 @@ from scipy.special import logsumexp
 
 from nodes.filtering.particles import (
     Particles,
-    effective_sample_size,
     normalize,
     resample_if_degenerate,
     reweight,
@@ -60,16 +59,16 @@ def test_reweight_is_bayes_rule():
 @given(logs)
 def test_the_effective_sample_size_lies_between_one_and_n(log_weights):
     particles = cloud(normalize(log_weights)[0])
-    ess = effective_sample_size(particles)
+    ess = particles.effective_sample_size
     assert 1 - 1e-9 <= ess <= len(log_weights) + 1e-9
     assert ess == pytest.approx(1 / np.sum(particles.weights**2))
 
 
 def test_the_effective_sample_size_reaches_its_bounds():
-    assert effective_sample_size(cloud(uniform_log_weights(50))) == pytest.approx(50)
+    assert cloud(uniform_log_weights(50)).effective_sample_size == pytest.approx(50)
     one = np.full(50, -np.inf)
     one[7] = 0.0
-    assert effective_sample_size(cloud(one)) == pytest.approx(1)
+    assert cloud(one).effective_sample_size == pytest.approx(1)
 
 
 @given(shares, st.floats(0, 1, exclude_max=True))

@@ -5,17 +5,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodes.vision.likelihood import LikelihoodOptions, background_constants, log_likelihoods
+from nodes.vision.likelihood import (
+    LikelihoodOptions,
+    background_constants,
+    log_gaussian,
+    with_miss_floor,
+)
 
 D0, VARIANCE = 0.12, 0.01
 FLOOR = -D0 / (2 * VARIANCE)
-MISS_FLOOR, LITERAL = LikelihoodOptions(), LikelihoodOptions(form="literal")
+MISS_FLOOR = LikelihoodOptions()
 
 
-def values(distance, visible=1.0, options=MISS_FLOOR):
+def values(distance, visible=1.0):
     distance = np.atleast_1d(np.asarray(distance, dtype=float))
     visible = np.broadcast_to(np.asarray(visible, dtype=float), distance.shape)
-    return log_likelihoods(distance, visible, D0, VARIANCE, 0.5, options)
+    return with_miss_floor(log_gaussian(distance, VARIANCE), visible, D0, VARIANCE, 0.5)
 
 
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=20))
@@ -43,9 +48,9 @@ def test_out_of_every_picture_is_flat_to_the_last_bit():
     assert np.all(found == found[0])
 
 
-def test_taken_literally_it_has_no_floor_and_does_not_look_where_the_picture_ends():
+def test_taken_literally_it_is_the_logarithm_of_one_gaussian():
     distance = np.array([0.0, 0.2, 1.0])
-    np.testing.assert_allclose(values(distance, 0.0, LITERAL), -distance / (2 * VARIANCE))
+    np.testing.assert_allclose(np.exp(log_gaussian(distance, VARIANCE)), np.exp(-distance / (2 * VARIANCE)))
 
 
 def test_the_constants_follow_the_background():

@@ -9,6 +9,7 @@ from nodes.camera import look_at
 from nodes.counting.histogram import SamplingOptions
 from nodes.vision.appearance import ModelUpdateOptions
 from nodes.vision.color import ColorOptions
+from nodes.vision.likelihood import LikelihoodOptions
 from nodes.vision.observation import (
     ObservationModel,
     ObservationOptions,
@@ -50,6 +51,12 @@ def test_the_likelihood_is_highest_where_the_target_is(options):
     floor = -appearance.miss_distance / (2 * appearance.variance)
     assert values[0] > floor / 2  # not 0: some samples lie on the target's edge
     assert values[3:] == pytest.approx(floor, abs=0.1)
+
+
+def test_taken_literally_it_has_no_floor_and_does_not_look_where_the_picture_ends():
+    model, appearance = ready(ObservationOptions(likelihood=LikelihoodOptions(form="literal")))
+    values = model.log_likelihoods(model.look(paint(HERE)), np.stack([HERE, OUTSIDE]), appearance)
+    assert values == pytest.approx([0, -1 / (2 * appearance.variance)])
 
 
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
@@ -150,6 +157,7 @@ def test_a_reference_taken_beside_the_target_finds_its_middle_by_its_own_colours
         color = ColorOptions(space="joint_rgb", bins_per_channel=6, background_weighting=weighted)
         model, _ = ready(ObservationOptions(color=color))
         picture = model.look(paint(HERE))
-        distance, _ = model.distances(picture, places, model.first_appearance(picture, beside))
+        boxes = project_boxes(places, TARGET, CAMERA)
+        distance = model.box_distances(picture, boxes, model.first_appearance(picture, beside))
         best[weighted] = abs(shifts[distance <= distance.min() + 1e-3].mean())
     assert best[True] < 0.5 * best[False]
