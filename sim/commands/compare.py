@@ -185,13 +185,11 @@ def _print_table(console: Console, keys: tuple[str, ...], rows: dict[str, Any]) 
 
 
 def _print_more(console: Console, label: str, each: dict[str, Any]) -> None:
-    lost = each["lost_fraction"]
+    shares = {name.upper(): share for name, share in each["lost_fraction"].items() if share is not None}
+    lost = ", in ".join(f"{share:.0%} by {name}" for name, share in shares.items())
     disagreement = _length(length(each, "disagreement"), "median", each["unit"])
-    console.print(
-        f"{label}: target lost in {lost['dcpf']:.0%} of the runs by DCPF, in {lost['cpf']:.0%} by CPF;"
-        f" nodes disagree by {disagreement}",
-        soft_wrap=True,
-    )
+    found = [f"target lost in {lost.replace(' by', ' of the runs by', 1)}"] if lost else []
+    console.print(f"{label}: {'; '.join([*found, f'nodes disagree by {disagreement}'])}", soft_wrap=True)
     indefinite = each["indefinite_local_fraction"]
     if indefinite and indefinite["max"]:
         share = f"{indefinite['median']:.0%}"
