@@ -4,7 +4,7 @@ Imports matplotlib: what only runs scenarios does not import this module.
 """
 
 from collections.abc import Sequence
-from itertools import product
+from itertools import cycle
 
 import numpy as np
 from jaxtyping import Float
@@ -14,13 +14,14 @@ from matplotlib.ticker import MaxNLocator
 from sim.experiments.found.findings import GroupFindings, Track
 from sim.metrics.intervals import Interval, mean_interval
 from sim.pictures.plots import log_axis
-from sim.pictures.theme import COLORS, LABELS, MUTED, PAPER
+from sim.pictures.theme import COLORS, LABELS, PAPER
 
 AXES = {
     "filter.model_update.alpha": "model update α (Eq. 4)",
     "network.iterations": "rounds of consensus t",
     "filter.n_particles": "particles n",
     "network.graph": "communication graph",
+    "network.conditions.loss": "messages lost, each with probability",
     "cameras": "cameras",
 }
 """What axes call the keys that are swept most; others go by their own name."""
@@ -38,36 +39,39 @@ _TINTS: dict[Track, str] = {
     "coded": "#56B4E9",
 }
 _MOST_TICKS = 9
+_LEAST_APART = 0.06  # of the axis: labels of ticks that are nearer run into each other
+_LEAST_RANGE = 2.5  # of a logarithmic axis, top over bottom: less makes mountains of noise
 _DASHES = ("-", "--", ":", "-.")
 
 
 def draw_error(axes: Axes, groups: Sequence[GroupFindings]) -> None:
-    """Mean RMSE over the first swept key in a band of 95% confidence, a dash for each value of the others."""
-    key, *others = (name for name, _ in groups[0].group.settings)
+    """Mean RMSE over the first swept key in a band of 95% confidence, a dash for each value of the others.
+
+    Where the key's values are words, nothing lies between them: points with bars, and no lines.
+    """
+    key, *_ = (name for name, _ in groups[0].group.settings)
     values = list(dict.fromkeys(group.settings[key] for group in groups))
     numbers, is_number = _numbers(values)
-    combinations = list(
-        product(*(dict.fromkeys(group.settings[name] for group in groups) for name in others))
-    )
-    for dash, combination in zip(_DASHES * len(combinations), combinations, strict=False):
-        line = [g for g in groups if tuple(g.settings[name] for name in others) == combination]
-        if not line:  # an interrupted experiment has not come to it
-            continue
+    for index, (label, line) in enumerate(_by_other_keys(groups).items()):
         x = numbers[[values.index(group.settings[key]) for group in line]]
-        label = "".join(
-            f", {_short(name)} = {value}" for name, value in zip(others, combination, strict=True)
-        )
         _draw_cameras(axes, x, line)
-        for track in ("single", "cpf", "dcpf"):
-            if line[0].has(track):
-                intervals = [mean_interval(group.rmse(track)) for group in line]
-                _draw_line(axes, x, intervals, _TINTS[track], _NAMES[track] + label, dash)
+        tracks: tuple[Track, ...] = ("single", "cpf", "dcpf")
+        for place, track in enumerate(tracks):
+            if not line[0].has(track):
+                continue
+            intervals = [mean_interval(group.rmse(track)) for group in line]
+            name = _NAMES[track] + label
+            if is_number:
+                dash = _DASHES[index % len(_DASHES)]
+                _draw_line(axes, x, intervals, _TINTS[track], name, dash)
+            else:
+                _draw_points(axes, x + 0.08 * (place - 1), intervals, _TINTS[track], "o", name)
     if not is_number or len(values) <= _MOST_TICKS:
-        axes.set_xticks(numbers, values)
+        axes.set_xticks(numbers, _apart(numbers, values))
     if not is_number:
         axes.set_xlim(-0.5, len(values) - 0.5)
     axes.set(xlabel=AXES.get(key, key), ylabel=_rmse_label(groups))
-    log_axis(axes)
+    _log_error_axis(axes)
 
 
 def draw_paths(axes: Axes, groups: Sequence[GroupFindings]) -> None:
@@ -109,22 +113,26 @@ def draw_frames(axes: Axes, groups: Sequence[GroupFindings]) -> None:
 
 
 def draw_bytes(axes: Axes, groups: Sequence[GroupFindings]) -> None:
-    """Mean RMSE over the bytes that all cameras send in a frame: DCPF's settings, CPF's codings."""
-    sent = [group.bytes_per_frame() for group in groups]
-    ours = [mean_interval(group.rmse("dcpf")) for group in groups]
-    x = np.array([each["dcpf"] for each in sent])
-    _draw_points(axes, x, ours, _TINTS["dcpf"], "-o", _NAMES["dcpf"])
-    _annotate(axes, groups, x, ours)
+    """Mean RMSE over the bytes that all cameras send in a frame: DCPF's settings, CPF's codings.
+
+    DCPF has a line over the first swept key, with a dash for each value of the others.
+    """
+    for dash, (label, line) in zip(cycle(_DASHES), _by_other_keys(groups).items(), strict=False):
+        ours = [mean_interval(group.rmse("dcpf")) for group in line]
+        x = np.array([group.bytes_per_frame()["dcpf"] for group in line])
+        _draw_points(axes, x, ours, _TINTS["dcpf"], f"{dash}o", _NAMES["dcpf"] + label)
+        _annotate(axes, line, x, ours, _TINTS["dcpf"])
+    sent = groups[0].bytes_per_frame()
     raw = mean_interval(groups[0].rmse("cpf"))
     points = [("cpf", raw, "o", "CPF, raw pictures"), ("bins", raw, "s", "CPF, bin indices as PNG")]
     if groups[0].has("coded"):
         points.append(("jpeg", mean_interval(groups[0].rmse("coded")), "^", "CPF, JPEG"))
     for name, interval, marker, label in points:
-        if name in sent[0]:
+        if name in sent:
             color = _TINTS["coded" if name == "jpeg" else "cpf"]
-            _draw_points(axes, np.array([sent[0][name]]), [interval], color, marker, label)
+            _draw_points(axes, np.array([sent[name]]), [interval], color, marker, label)
     axes.set(xlabel="bytes a frame, all cameras", ylabel=_rmse_label(groups), xscale="log")
-    log_axis(axes)
+    _log_error_axis(axes)
 
 
 def draw_time(axes: Axes, groups: Sequence[GroupFindings]) -> None:
@@ -138,7 +146,7 @@ def draw_time(axes: Axes, groups: Sequence[GroupFindings]) -> None:
         )
         _draw_cost(axes, groups, "dcpf", spent, "each camera")
     axes.set(xlabel="processor time a frame / ms", ylabel=_rmse_label(groups))
-    log_axis(axes)
+    _log_error_axis(axes)
     axes.set_xlim(left=0)
 
 
@@ -147,7 +155,7 @@ def _draw_cost(
 ) -> None:
     intervals = [mean_interval(group.rmse(track)) for group in groups]
     _draw_points(axes, spent, intervals, _TINTS[track], "-o", f"{_NAMES[track]}, {where}")
-    _annotate(axes, groups, spent, intervals)
+    _annotate(axes, groups, spent, intervals, _TINTS[track])
 
 
 def _draw_cameras(axes: Axes, x: Float[np.ndarray, " S"], groups: Sequence[GroupFindings]) -> None:
@@ -181,20 +189,53 @@ def _draw_points(
 
 
 def _annotate(
-    axes: Axes, groups: Sequence[GroupFindings], x: Float[np.ndarray, " S"], intervals: Sequence[Interval]
+    axes: Axes,
+    groups: Sequence[GroupFindings],
+    x: Float[np.ndarray, " S"],
+    intervals: Sequence[Interval],
+    color: str,
 ) -> None:
-    """The value of the swept key below the first point's bar, and above the last one's."""
-    for index, end, offset, align in (
-        (0, intervals[0].low, -4, "top"),
-        (-1, intervals[-1].high, 4, "bottom"),
-    ):
+    """The value of the swept key beside the outermost points, where no line of theirs is."""
+    for index, offset, align in ((int(x.argmin()), -6, "right"), (int(x.argmax()), 6, "left")):
         name, value = groups[index].group.settings[0]
         axes.annotate(
-            f"{_short(name)} = {value}", (x[index], end), xytext=(0, offset), textcoords="offset points",
-            ha="center", va=align, color=MUTED, size=8, zorder=5,
-            bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5, "alpha": 0.85},
+            f"{_short(name)} = {value}", (x[index], intervals[index].value), xytext=(offset, 0),
+            textcoords="offset points", ha=align, va="center", color=color, size=8, zorder=5,
+            bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5, "alpha": 0.7},
         )  # fmt: skip
-    axes.margins(x=0.12, y=0.12)
+    axes.margins(x=0.22, y=0.12)
+
+
+def _by_other_keys(groups: Sequence[GroupFindings]) -> dict[str, list[GroupFindings]]:
+    """The groups with the same values of all swept keys but the first, by what legends call these values."""
+    lines: dict[str, list[GroupFindings]] = {}
+    for group in groups:
+        label = "".join(f", {_in_words(name, value)}" for name, value in group.group.settings[1:])
+        lines.setdefault(label, []).append(group)
+    return lines
+
+
+def _in_words(key: str, value: str) -> str:
+    """A setting for a legend: words speak for themselves, numbers need their name."""
+    return f"{_short(key)} = {value}" if _numbers([value])[1] else value.replace("_", " ")
+
+
+def _apart(numbers: Float[np.ndarray, " S"], values: Sequence[str]) -> list[str]:
+    """The labels of ticks, none where one would run into the one before."""
+    labels, last = [], -np.inf
+    for number, value in zip(numbers, values, strict=True):
+        is_free = number - last >= _LEAST_APART * np.ptp(numbers)
+        labels.append(value if is_free else "")
+        last = number if is_free else last
+    return labels
+
+
+def _log_error_axis(axes: Axes) -> None:
+    """A logarithmic axis of errors, wide enough that what is alike looks alike."""
+    log_axis(axes)
+    bottom, top = axes.get_ylim()
+    widen = np.sqrt(max(1.0, _LEAST_RANGE / (top / bottom)))
+    axes.set_ylim(bottom / widen, top * widen)
 
 
 def _rmse_label(groups: Sequence[GroupFindings]) -> str:
