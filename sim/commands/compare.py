@@ -152,10 +152,8 @@ def _print(found: dict[str, Any], verdicts: Sequence[Verdict], folder: Path) -> 
         if not each["settings"]:
             _print_more(console, label, each)
     for verdict in verdicts:
-        holds = "holds" if verdict.holds else "does not hold"
-        console.print(
-            f"{verdict.study}, {verdict.label}, {verdict.claim}: {holds}: {verdict.text}", soft_wrap=True
-        )
+        claim = f"{verdict.study}, {verdict.label}, {verdict.claim}"
+        console.print(f"{claim}: {verdict.in_words}: {verdict.text}", soft_wrap=True)
     console.print(f"figures, plots and report.html in {folder}", soft_wrap=True)
 
 

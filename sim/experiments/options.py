@@ -20,8 +20,6 @@ class FlatClaim(Options):
     """DCPF hardly depends on the swept key, where the single camera does."""
 
     kind: Literal["flat"]
-    otherwise: str = ""
-    """What to write beside the figure, should it not hold: why."""
 
 
 class WithinClaim(Options):
@@ -32,16 +30,12 @@ class WithinClaim(Options):
     """The per cent."""
     from_value: float
     """The value of the study's first key from which it holds."""
-    otherwise: str = ""
-    """What to write beside the figure, should it not hold: why."""
 
 
 class NoisierClaim(Options):
     """DCPF's error varies more between runs with the first value of the second swept key than the last."""
 
     kind: Literal["noisier"]
-    otherwise: str = ""
-    """What to write beside the figure, should it not hold: why."""
 
 
 Claim = Annotated[FlatClaim | WithinClaim | NoisierClaim, Field(discriminator="kind")]

@@ -118,7 +118,7 @@ class StudyReport:
 
     title: str
     plot: Plot
-    claims: Sequence[tuple[bool, str]]
+    claims: Sequence[tuple[str, str]]
     figures: Sequence[Table]
 
 

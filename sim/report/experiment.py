@@ -89,7 +89,7 @@ def _study(findings: Findings, name: str, verdicts: Sequence[Verdict]) -> StudyR
         plot=Plot(
             drawing, f"{name}: bands and bars are 95% confidence or the spread of the runs.", wide=True
         ),
-        claims=[(each.holds, f"{each.label}, {each.claim}: {each.text}") for each in verdicts],
+        claims=[(each.in_words, f"{each.label}, {each.claim}: {each.text}") for each in verdicts],
         figures=[_table(label, findings.study(name, label)) for label in findings.labels(name)],
     )
 
