@@ -52,17 +52,15 @@ def draw_error(axes: Axes, groups: Sequence[GroupFindings]) -> None:
     key, *_ = (name for name, _ in groups[0].group.settings)
     values = list(dict.fromkeys(group.settings[key] for group in groups))
     numbers, is_number = _numbers(values)
-    for index, (label, line) in enumerate(_by_other_keys(groups).items()):
-        x = numbers[[values.index(group.settings[key]) for group in line]]
-        _draw_cameras(axes, x, line)
-        tracks: tuple[Track, ...] = ("single", "cpf", "dcpf")
-        for place, track in enumerate(tracks):
-            if not line[0].has(track):
-                continue
+    tracks: tuple[Track, ...] = ("single", "cpf", "dcpf")
+    for place, track in enumerate(tracks):
+        for dash, (label, line) in zip(cycle(_DASHES), _lines(groups, track).items(), strict=False):
+            x = numbers[[values.index(group.settings[key]) for group in line]]
             intervals = [mean_interval(group.rmse(track)) for group in line]
             name = _NAMES[track] + label
+            if track == "single":
+                _draw_cameras(axes, x, line)
             if is_number:
-                dash = _DASHES[index % len(_DASHES)]
                 _draw_line(axes, x, intervals, _TINTS[track], name, dash)
             else:
                 _draw_points(axes, x + 0.08 * (place - 1), intervals, _TINTS[track], "o", name)
@@ -117,11 +115,12 @@ def draw_bytes(axes: Axes, groups: Sequence[GroupFindings]) -> None:
 
     DCPF has a line over the first swept key, with a dash for each value of the others.
     """
-    for dash, (label, line) in zip(cycle(_DASHES), _by_other_keys(groups).items(), strict=False):
+    for index, (label, line) in enumerate(_lines(groups, "dcpf").items()):
         ours = [mean_interval(group.rmse("dcpf")) for group in line]
         x = np.array([group.bytes_per_frame()["dcpf"] for group in line])
-        _draw_points(axes, x, ours, _TINTS["dcpf"], f"{dash}o", _NAMES["dcpf"] + label)
-        _annotate(axes, line, x, ours, _TINTS["dcpf"])
+        style = f"{_DASHES[index % len(_DASHES)]}o"
+        name = _NAMES["dcpf"] + label + _from_to(line)
+        _draw_points(axes, x, ours, _TINTS["dcpf"], style, name, hollow=index > 0)
     sent = groups[0].bytes_per_frame()
     raw = mean_interval(groups[0].rmse("cpf"))
     points = [("cpf", raw, "o", "CPF, raw pictures"), ("bins", raw, "s", "CPF, bin indices as PNG")]
@@ -154,14 +153,12 @@ def _draw_cost(
     axes: Axes, groups: Sequence[GroupFindings], track: Track, spent: Float[np.ndarray, " S"], where: str
 ) -> None:
     intervals = [mean_interval(group.rmse(track)) for group in groups]
-    _draw_points(axes, spent, intervals, _TINTS[track], "-o", f"{_NAMES[track]}, {where}")
-    _annotate(axes, groups, spent, intervals, _TINTS[track])
+    name = f"{_NAMES[track]}, {where}{_from_to(groups)}"
+    _draw_points(axes, spent, intervals, _TINTS[track], "-o", name)
 
 
 def _draw_cameras(axes: Axes, x: Float[np.ndarray, " S"], groups: Sequence[GroupFindings]) -> None:
     """The mean RMSE of each single camera, thin; not where their number is what is swept."""
-    if not groups[0].has("single"):
-        return
     each = [group.node_rmse("single").mean(axis=0) for group in groups]
     if len({len(cameras) for cameras in each}) == 1:
         lines = axes.plot(x, np.array(each), color=_TINTS["single"], linewidth=0.7, alpha=0.6)
@@ -173,37 +170,43 @@ def _draw_line(
     axes: Axes, x: Float[np.ndarray, " S"], intervals: Sequence[Interval], color: str, label: str, dash: str
 ) -> None:
     value, low, high = np.array([[each.value, each.low, each.high] for each in intervals]).T
-    axes.plot(x, value, dash, marker="o", markersize=4, color=color, linewidth=1.6, label=label)
+    fill = color if dash == "-" else PAPER
+    axes.plot(
+        x,
+        value,
+        dash,
+        marker="o",
+        markersize=4,
+        color=color,
+        markerfacecolor=fill,
+        linewidth=1.6,
+        label=label,
+    )
     axes.fill_between(x, low, high, color=color, alpha=0.15, linewidth=0)
 
 
 def _draw_points(
-    axes: Axes, x: Float[np.ndarray, " S"], intervals: Sequence[Interval], color: str, style: str, label: str
+    axes: Axes,
+    x: Float[np.ndarray, " S"],
+    intervals: Sequence[Interval],
+    color: str,
+    style: str,
+    label: str,
+    *,
+    hollow: bool = False,
 ) -> None:
     """Points with bars of 95% confidence."""
     value, low, high = np.array([[each.value, each.low, each.high] for each in intervals]).T
     axes.errorbar(
         x, value, yerr=[value - low, high - value], fmt=style, color=color, markersize=5, linewidth=1.6,
-        elinewidth=0.8, capsize=2, label=label,
+        markerfacecolor=PAPER if hollow else color, elinewidth=0.8, capsize=2, label=label,
     )  # fmt: skip
 
 
-def _annotate(
-    axes: Axes,
-    groups: Sequence[GroupFindings],
-    x: Float[np.ndarray, " S"],
-    intervals: Sequence[Interval],
-    color: str,
-) -> None:
-    """The value of the swept key beside the outermost points, where no line of theirs is."""
-    for index, offset, align in ((int(x.argmin()), -6, "right"), (int(x.argmax()), 6, "left")):
-        name, value = groups[index].group.settings[0]
-        axes.annotate(
-            f"{_short(name)} = {value}", (x[index], intervals[index].value), xytext=(offset, 0),
-            textcoords="offset points", ha=align, va="center", color=color, size=8, zorder=5,
-            bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5, "alpha": 0.7},
-        )  # fmt: skip
-    axes.margins(x=0.22, y=0.12)
+def _from_to(groups: Sequence[GroupFindings]) -> str:
+    """What a line goes along, for legends: from the first to the last value of the first swept key."""
+    (name, first), (_, last) = (groups[end].group.settings[0] for end in (0, -1))
+    return f"\n{_short(name)} = {first} to {last}"
 
 
 def _by_other_keys(groups: Sequence[GroupFindings]) -> dict[str, list[GroupFindings]]:
@@ -212,6 +215,16 @@ def _by_other_keys(groups: Sequence[GroupFindings]) -> dict[str, list[GroupFindi
     for group in groups:
         label = "".join(f", {_in_words(name, value)}" for name, value in group.group.settings[1:])
         lines.setdefault(label, []).append(group)
+    return lines
+
+
+def _lines(groups: Sequence[GroupFindings], track: Track) -> dict[str, list[GroupFindings]]:
+    """The lines of an estimator by their labels: one without a label if the other keys do not concern it."""
+    lines = {label: line for label, line in _by_other_keys(groups).items() if line[0].has(track)}
+    found = [{g.group.settings[0]: tuple(g.rmse(track)) for g in line} for line in lines.values()]
+    whole = max(found, key=len, default={})
+    if len(lines) > 1 and all(each.items() <= whole.items() for each in found):
+        return {"": list(lines.values())[found.index(whole)]}
     return lines
 
 

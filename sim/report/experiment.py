@@ -15,6 +15,7 @@ from sim.metrics.consistency import anees_band
 from sim.pictures.experiment import plot_study
 from sim.report.elements import ExperimentReport, Plot, StudyReport, Table
 from sim.report.figures import plot_world
+from sim.report.one_run import plainest, shown_runs
 from sim.report.svg import inline
 from sim.running.provenance import versions
 from sim.running.results import Results
@@ -30,13 +31,18 @@ def experiment_report(findings: Findings, verdicts: Sequence[Verdict]) -> Experi
         verdicts: Its claims, held against that.
     """
     names = list(dict.fromkeys(each.group.study for each in findings.groups))
+    plain = plainest(findings)
     return ExperimentReport(
         name=findings.options.name,
         facts=_facts(findings),
         versions=versions(),
         notes=_notes(findings),
-        worlds=[*_worlds(findings)],
+        worlds=[*_worlds(plain)],
         studies=[_study(findings, name, [each for each in verdicts if each.study == name]) for name in names],
+        # As the scenarios are, if some study has them so; whoever has interrupted it wants to be gone.
+        runs=[]
+        if any(findings.missing.values())
+        else shown_runs([each for each in plain if not each.settings] or plain),
     )
 
 
@@ -64,13 +70,13 @@ def _notes(findings: Findings) -> list[str]:
     return [f"The experiment was interrupted, or runs failed: {lacking}. {shown}"]
 
 
-def _worlds(findings: Findings) -> Iterator[Plot]:
+def _worlds(groups: Sequence[GroupFindings]) -> Iterator[Plot]:
     """The ground of each scenario, once for all its settings; none where it is a camera's picture."""
     number = count(1)
-    for name in dict.fromkeys(each.group.scenario for each in findings.groups):
-        group = next(each.group for each in reversed(findings.groups) if each.group.scenario == name)
+    for group in (each.group for each in groups):
         if group.scenario_run.target.space == "image":
             continue
+        name = group.scenario
         drawing = inline(
             plot_world(Results(group.scenario_run), Assembly(group.scenario_run)),
             f"world-{next(number)}",

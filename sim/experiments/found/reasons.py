@@ -59,8 +59,8 @@ def why_not_flat(groups: Sequence[GroupFindings], allowed: float) -> Iterator[st
     if groups[0].has("cpf"):
         central = np.ptp([float(group.rmse("cpf").mean()) for group in groups])
         is_alike = central >= ALIKE * np.ptp(means)
-        whose = "It is not the network's doing: CPF changes, too" if is_alike else "It is not in CPF"
-        yield f"{whose}: by {central:.3f} {unit}."
+        also = f"CPF changes by {central:.3f} {unit}"
+        yield f"It is not the network's doing: {also}, too." if is_alike else f"{also} only."
 
     frame = _apart_from(worst, best)
     if frame is not None:
@@ -100,8 +100,9 @@ def why_not_within(groups: Sequence[GroupFindings], worst: GroupFindings, allowe
     excess = float(ours.mean() - theirs.mean())
     have_agreed = disagreement < ALIKE * excess and fall < allowed - 1
     apart = f"the nodes differ by {disagreement:.3f} {worst.unit}, and CPF's error is {excess:.3f} less"
-    helped = f"; from {key} = {first} to {last}, DCPF's error falls by {fall:.0%}" if last != first else ""
-    yield f"The nodes have {'' if have_agreed else 'not '}agreed: {apart}{helped}."
+    # whole per cent: none is neither more nor less
+    change = f"; from {key} = {first} to {last}, DCPF's error changes by {round(-100 * fall)}%"
+    yield f"The nodes have {'' if have_agreed else 'not '}agreed: {apart}{change if last != first else ''}."
 
     indefinite = float(np.mean([each["fusion"]["indefinite_local_fraction"] for each in summaries]))
     if indefinite > 0:

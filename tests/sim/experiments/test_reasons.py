@@ -80,7 +80,8 @@ def test_where_every_run_is_lost_somewhere_nothing_is_left(small):
 
 
 @pytest.mark.parametrize(
-    ("cpf", "sentence"), [(0.2, "CPF changes, too: by 0.200 m"), (0.1, "not in CPF: by 0.100")]
+    ("cpf", "sentence"),
+    [(0.2, "not the network's doing: CPF changes by 0.200 m, too."), (0.1, ". CPF changes by 0.100 m only.")],
 )
 def test_whether_cpf_changes_too(small, cpf, sentence):
     text = why(small, FLAT, lambda t, _n, _s: (0.1 + 0.3 * (t > 1), 0.1 + cpf * (t > 1), 0.5, 0.3))
@@ -126,7 +127,7 @@ def test_whether_it_is_the_rounds(small, disagreement, falls, sentence):
     )
 
     assert sentence in text
-    assert f"from network.iterations = 1 to 12, DCPF's error falls by {falls:.0%}." in text
+    assert f"from network.iterations = 1 to 12, DCPF's error changes by {round(-100 * falls)}%." in text
 
 
 @pytest.mark.parametrize("share", [0.0, 0.6])

@@ -114,9 +114,8 @@ def test_pictures_become_smaller_where_there_are_too_many(ran, small, monkeypatc
     why = choose_moments(results)
     previews = told_again(results, assembly, why, lambda _: None)
     monkeypatch.setattr(stills, "_MIN_WIDTH_PX", 60)
-    monkeypatch.setattr(stills, "LIMIT_BYTES", 40_000)
 
-    moments = moments_of(results, assembly, previews, why)
+    moments = moments_of(results, assembly, previews, why, limit_bytes=40_000)
 
     pictures = [still for moment in moments for still in moment.stills]
     assert sum(len(each.source) for each in pictures) <= 40_000
