@@ -20,6 +20,14 @@ from sim.report.svg import inline
 from sim.running.provenance import versions
 from sim.running.results import Results
 
+_CAPTIONS: Mapping[str, str] = {
+    "error": "mean over the runs, in bands or bars of 95% confidence",
+    "paths": "thin, each run, its deviation from its own truth laid on the mean true path; thick, their mean",
+    "frames": "median over runs and nodes, in a band from 10 to 90% of them",
+    "bytes": "mean over the runs, in bars of 95% confidence",
+    "time": "mean over the runs, in bars of 95% confidence; processor time in the median",
+    "strips": "a point a run, the median as a bar",
+}
 _ESTIMATORS = {"dcpf": "DCPF", "cpf": "CPF", "best single": "best single camera", "cpf jpeg": "CPF, JPEG"}
 
 
@@ -86,18 +94,22 @@ def _worlds(groups: Sequence[GroupFindings]) -> Iterator[Plot]:
 
 
 def _study(findings: Findings, name: str, verdicts: Sequence[Verdict]) -> StudyReport:
-    title = findings.options.studies[name].title or name
+    options = findings.options.studies[name]
+    title = options.title or name
     figure = plot_study(findings, name)
     figure.suptitle("")  # the heading has said it
     drawing = inline(figure, f"study-{name}", f"Figure of the study {title}")
     return StudyReport(
         title=title,
-        plot=Plot(
-            drawing, f"{name}: bands and bars are 95% confidence or the spread of the runs.", wide=True
-        ),
+        plot=Plot(drawing, f"{_runs(findings)} of each setting: {_CAPTIONS[options.plot]}.", wide=True),
         claims=[(each.in_words, f"{each.label}, {each.claim}: {each.text}") for each in verdicts],
         figures=[_table(label, findings.study(name, label)) for label in findings.labels(name)],
     )
+
+
+def _runs(findings: Findings) -> str:
+    runs = findings.options.runs
+    return f"{runs} runs" if runs > 1 else "One run"
 
 
 def _table(label: str, groups: Sequence[GroupFindings]) -> Table:

@@ -99,7 +99,7 @@ def why_not_within(groups: Sequence[GroupFindings], worst: GroupFindings, allowe
     disagreement = float(np.mean([length(each, "disagreement") for each in summaries]))
     excess = float(ours.mean() - theirs.mean())
     have_agreed = disagreement < ALIKE * excess and fall < allowed - 1
-    apart = f"the nodes differ by {disagreement:.3f} {worst.unit}, and CPF's error is {excess:.3f} less"
+    apart = f"they differ by {disagreement:.3f} {worst.unit}, and CPF's error is {excess:.3f} less"
     # whole per cent: none is neither more nor less
     change = f"; from {key} = {first} to {last}, DCPF's error changes by {round(-100 * fall)}%"
     yield f"The nodes have {'' if have_agreed else 'not '}agreed: {apart}{change if last != first else ''}."

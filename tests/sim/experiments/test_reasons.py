@@ -113,8 +113,8 @@ def test_losses_that_cpf_has_not(small, lost_by_cpf):
 @pytest.mark.parametrize(
     ("disagreement", "falls", "sentence"),
     [
-        (0.01, 0.0, "The nodes have agreed: the nodes differ by 0.010 m, and CPF's error is 0.100 less"),
-        (0.06, 0.0, "The nodes have not agreed: the nodes differ by 0.060 m"),
+        (0.01, 0.0, "The nodes have agreed: they differ by 0.010 m, and CPF's error is 0.100 less"),
+        (0.06, 0.0, "The nodes have not agreed: they differ by 0.060 m"),
         (0.01, 0.1, "The nodes have not agreed"),
     ],
 )

@@ -55,7 +55,7 @@ def test_a_report_has_every_study_and_the_summarys_figures(dcpf, page):
         "What was run",
         TITLE,
         *("ways", "frames", "bytes", "strips"),
-        "small (robust), seed 0: what the cameras saw",
+        "What the cameras saw in small (robust), seed 0",
     ]
     assert TITLE in read.text()
     assert "is missing" not in read.text()
