@@ -48,8 +48,8 @@ class StudyOptions(Options):
     """What the figure shows, in a few words."""
     plot: Literal["error", "paths", "frames", "bytes", "time", "strips"] = "error"
     """`error`: RMSE over the first swept key, a line for each value of the others; `paths`: trajectories on
-    the ground; `frames`: the error over time; `bytes`: RMSE over the bytes sent a frame; `time`: RMSE over
-    processor time; `strips`: a point a run."""
+    the ground; `frames`: the error over time; `bytes`: RMSE over the bytes sent a frame, with such lines;
+    `time`: RMSE over processor time; `strips`: a point a run."""
     sweep: Mapping[str, Values] = Field(default={}, max_length=3)
     """Dotted keys of the scenario with their values: `0:0.5:0.1`, `1:20` (the last included), `a,b,c`, or a
     list. A number as the value of `cameras` takes the first so many."""
