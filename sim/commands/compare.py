@@ -185,9 +185,12 @@ def _print_table(console: Console, keys: tuple[str, ...], rows: dict[str, Any]) 
 def _print_more(console: Console, label: str, each: dict[str, Any]) -> None:
     shares = {name.upper(): share for name, share in each["lost_fraction"].items() if share is not None}
     lost = ", in ".join(f"{share:.0%} by {name}" for name, share in shares.items())
-    disagreement = _length(length(each, "disagreement"), "median", each["unit"])
     found = [f"target lost in {lost.replace(' by', ' of the runs by', 1)}"] if lost else []
-    console.print(f"{label}: {'; '.join([*found, f'nodes disagree by {disagreement}'])}", soft_wrap=True)
+    if len(each["summaries"][0]["cameras"]) > 1:
+        disagreement = _length(length(each, "disagreement"), "median", each["unit"])
+        found.append(f"nodes disagree by {disagreement}")
+    if found:
+        console.print(f"{label}: {'; '.join(found)}", soft_wrap=True)
     indefinite = each["indefinite_local_fraction"]
     if indefinite and indefinite["max"]:
         share = f"{indefinite['median']:.0%}"
