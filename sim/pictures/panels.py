@@ -21,7 +21,7 @@ AXES = {
     "network.iterations": "rounds of consensus t",
     "filter.n_particles": "particles n",
     "network.graph": "communication graph",
-    "network.conditions.loss": "messages lost, each with probability",
+    "network.conditions.loss": "probability that a message is lost",
     "cameras": "cameras",
 }
 """What axes call the keys that are swept most; others go by their own name."""
