@@ -14,18 +14,9 @@ from matplotlib.ticker import MaxNLocator
 from sim.experiments.found.findings import GroupFindings, Track
 from sim.metrics.intervals import Interval, mean_interval
 from sim.pictures.plots import log_axis
+from sim.pictures.swept import AXES, from_to, lines_of, places_of, tick_labels
 from sim.pictures.theme import COLORS, LABELS, PAPER
 
-AXES = {
-    "filter.model_update.alpha": "model update α (Eq. 4)",
-    "network.iterations": "rounds of consensus t",
-    "filter.n_particles": "particles n",
-    "network.graph": "communication graph",
-    "network.conditions.loss": "probability that a message is lost",
-    "cameras": "cameras",
-}
-"""What axes call the keys that are swept most; others go by their own name."""
-_SHORT = {"filter.n_particles": "n", "network.iterations": "t", "filter.model_update.alpha": "α"}
 _NAMES: dict[Track, str] = {
     "dcpf": LABELS["dcpf"],
     "cpf": LABELS["cpf"],
@@ -39,7 +30,6 @@ _TINTS: dict[Track, str] = {
     "coded": "#56B4E9",
 }
 _MOST_TICKS = 9
-_LEAST_APART = 0.06  # of the axis: labels of ticks that are nearer run into each other
 _LEAST_RANGE = 2.5  # of a logarithmic axis, top over bottom: less makes mountains of noise
 _DASHES = ("-", "--", ":", "-.")
 
@@ -51,11 +41,11 @@ def draw_error(axes: Axes, groups: Sequence[GroupFindings]) -> None:
     """
     key, *_ = (name for name, _ in groups[0].group.settings)
     values = list(dict.fromkeys(group.settings[key] for group in groups))
-    numbers, is_number = _numbers(values)
+    places, is_number = places_of(values)
     tracks: tuple[Track, ...] = ("single", "cpf", "dcpf")
     for place, track in enumerate(tracks):
-        for dash, (label, line) in zip(cycle(_DASHES), _lines(groups, track).items(), strict=False):
-            x = numbers[[values.index(group.settings[key]) for group in line]]
+        for dash, (label, line) in zip(cycle(_DASHES), lines_of(groups, track).items(), strict=False):
+            x = places[[values.index(group.settings[key]) for group in line]]
             intervals = [mean_interval(group.rmse(track)) for group in line]
             name = _NAMES[track] + label
             if track == "single":
@@ -65,7 +55,7 @@ def draw_error(axes: Axes, groups: Sequence[GroupFindings]) -> None:
             else:
                 _draw_points(axes, x + 0.08 * (place - 1), intervals, _TINTS[track], "o", name)
     if not is_number or len(values) <= _MOST_TICKS:
-        axes.set_xticks(numbers, _apart(numbers, values))
+        axes.set_xticks(places, tick_labels(places, values))
     if not is_number:
         axes.set_xlim(-0.5, len(values) - 0.5)
     axes.set(xlabel=AXES.get(key, key), ylabel=_rmse_label(groups))
@@ -115,11 +105,11 @@ def draw_bytes(axes: Axes, groups: Sequence[GroupFindings]) -> None:
 
     DCPF has a line over the first swept key, with a dash for each value of the others.
     """
-    for index, (label, line) in enumerate(_lines(groups, "dcpf").items()):
+    for index, (label, line) in enumerate(lines_of(groups, "dcpf").items()):
         ours = [mean_interval(group.rmse("dcpf")) for group in line]
         x = np.array([group.bytes_per_frame()["dcpf"] for group in line])
         style = f"{_DASHES[index % len(_DASHES)]}o"
-        name = _NAMES["dcpf"] + label + _from_to(line)
+        name = _NAMES["dcpf"] + label + from_to(line)
         _draw_points(axes, x, ours, _TINTS["dcpf"], style, name, hollow=index > 0)
     sent = groups[0].bytes_per_frame()
     raw = mean_interval(groups[0].rmse("cpf"))
@@ -153,7 +143,7 @@ def _draw_cost(
     axes: Axes, groups: Sequence[GroupFindings], track: Track, spent: Float[np.ndarray, " S"], where: str
 ) -> None:
     intervals = [mean_interval(group.rmse(track)) for group in groups]
-    name = f"{_NAMES[track]}, {where}{_from_to(groups)}"
+    name = f"{_NAMES[track]}, {where}{from_to(groups)}"
     _draw_points(axes, spent, intervals, _TINTS[track], "-o", name)
 
 
@@ -203,46 +193,6 @@ def _draw_points(
     )  # fmt: skip
 
 
-def _from_to(groups: Sequence[GroupFindings]) -> str:
-    """What a line goes along, for legends: from the first to the last value of the first swept key."""
-    (name, first), (_, last) = (groups[end].group.settings[0] for end in (0, -1))
-    return f"\n{_short(name)} = {first} to {last}"
-
-
-def _by_other_keys(groups: Sequence[GroupFindings]) -> dict[str, list[GroupFindings]]:
-    """The groups with the same values of all swept keys but the first, by what legends call these values."""
-    lines: dict[str, list[GroupFindings]] = {}
-    for group in groups:
-        label = "".join(f", {_in_words(name, value)}" for name, value in group.group.settings[1:])
-        lines.setdefault(label, []).append(group)
-    return lines
-
-
-def _lines(groups: Sequence[GroupFindings], track: Track) -> dict[str, list[GroupFindings]]:
-    """The lines of an estimator by their labels: one without a label if the other keys do not concern it."""
-    lines = {label: line for label, line in _by_other_keys(groups).items() if line[0].has(track)}
-    found = [{g.group.settings[0]: tuple(g.rmse(track)) for g in line} for line in lines.values()]
-    whole = max(found, key=len, default={})
-    if len(lines) > 1 and all(each.items() <= whole.items() for each in found):
-        return {"": list(lines.values())[found.index(whole)]}
-    return lines
-
-
-def _in_words(key: str, value: str) -> str:
-    """A setting for a legend: words speak for themselves, numbers need their name."""
-    return f"{_short(key)} = {value}" if _numbers([value])[1] else value.replace("_", " ")
-
-
-def _apart(numbers: Float[np.ndarray, " S"], values: Sequence[str]) -> list[str]:
-    """The labels of ticks, none where one would run into the one before."""
-    labels, last = [], -np.inf
-    for number, value in zip(numbers, values, strict=True):
-        is_free = number - last >= _LEAST_APART * np.ptp(numbers)
-        labels.append(value if is_free else "")
-        last = number if is_free else last
-    return labels
-
-
 def _log_error_axis(axes: Axes) -> None:
     """A logarithmic axis of errors, wide enough that what is alike looks alike."""
     log_axis(axes)
@@ -253,15 +203,3 @@ def _log_error_axis(axes: Axes) -> None:
 
 def _rmse_label(groups: Sequence[GroupFindings]) -> str:
     return f"RMSE of the position / {groups[0].unit}"
-
-
-def _numbers(values: Sequence[str]) -> tuple[Float[np.ndarray, " S"], bool]:
-    """The values as numbers, or their places where they are words."""
-    try:
-        return np.array([float(value) for value in values]), True
-    except ValueError:
-        return np.arange(len(values), dtype=float), False
-
-
-def _short(key: str) -> str:
-    return _SHORT.get(key, key.rpartition(".")[2].replace("_", " "))

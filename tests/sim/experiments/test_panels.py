@@ -11,6 +11,7 @@ from sim.experiments.found.findings import Findings, GroupFindings
 from sim.experiments.options import ExperimentOptions
 from sim.experiments.plan import make_plan
 from sim.pictures.experiment import PANELS, plot_page, plot_study
+from sim.pictures.swept import lines_of, places_of, tick_labels
 from sim.pictures.theme import COLORS
 
 N_FRAMES = 5
@@ -171,6 +172,21 @@ def test_bytes_have_a_line_for_each_value_of_the_second_key(findings):
         "DCPF, metropolis\nt = 1 to 12",
         "DCPF, event triggered\nt = 1 to 12",
     }
+
+
+def test_ticks_that_would_run_into_each_other_have_no_label():
+    places, is_number = places_of(["1", "2", "4", "20"])
+
+    assert is_number
+    assert tick_labels(places, ["1", "2", "4", "20"]) == ["1", "", "4", "20"]
+
+
+def test_yes_and_no_are_named(findings):
+    key = ("filter.model_update.gated", "true")
+    (group, *_) = findings.study("rules")
+    named = replace(group, group=replace(group.group, settings=(*group.group.settings, key)))
+
+    assert list(lines_of([named], "dcpf")) == [", metropolis, gated = true"]
 
 
 def test_time_is_a_cameras_and_the_central_nodes(findings):
