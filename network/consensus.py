@@ -132,7 +132,6 @@ class Consensus:
             self.counters["old"] += 1
         else:
             self._heard[sender] = position
-            self._membership.hear(message.down, message.frame)
             self._keep(message)
         return self._advance()
 
@@ -151,6 +150,13 @@ class Consensus:
     def restore(self, neighbor: str) -> None:
         """Counts on a neighbour again, from the next frame on."""
         self._gone.discard(neighbor)
+
+    def miss(self, neighbor: str, frame: int, round_: int) -> tuple[ConsensusMessage, ...]:
+        """A neighbour's message is known not to come: its round is done without it."""
+        if neighbor not in self._absent and self._heard[neighbor] < (frame, round_):
+            self._heard[neighbor] = (frame, round_)
+            self.counters["missed"] += 1
+        return self._advance()
 
     def expire(self) -> tuple[ConsensusMessage, ...]:
         """Does this round without those that are late; they take part in the next one."""
@@ -188,6 +194,9 @@ class Consensus:
     def _keep(self, message: ConsensusMessage) -> None:
         """Keeps a message that this round, the next one, or a later frame's first can use."""
         frame, round_ = self._position
+        # what is told of links counts when its frame comes
+        if message.frame <= frame:
+            self._membership.hear(message.down, message.frame)
         late = (message.frame, message.round) < self._position
         if late and not (self._algorithm.uses_late and message.frame == frame and not self.done):
             self.counters["old"] += 1

@@ -107,6 +107,21 @@ class Traffic:
         self.refused[reason] += 1
 
 
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """A message of the rounds that is known to be lost: nobody need wait for it.
+
+    Attributes:
+        sender: Who sent it.
+        frame: Frame of the run.
+        round: Round within the frame, from 1.
+    """
+
+    sender: str
+    frame: int
+    round: int
+
+
 @runtime_checkable
 class Transport(Protocol):
     """A node's way to the others.
@@ -136,7 +151,7 @@ class Transport(Protocol):
     def send(self, message: PeerMessage | EstimateMessage | StatusMessage | PreviewMessage) -> None:
         """Sends a message of this node to whom it concerns."""
 
-    def receive(self, sender: str, timeout_s: float) -> PeerMessage | None:
+    def receive(self, sender: str, timeout_s: float) -> PeerMessage | Loss | None:
         """The next valid message of one of the nodes that are linked to this one.
 
         Args:
@@ -144,7 +159,7 @@ class Transport(Protocol):
             timeout_s: How long to wait for it; 0 only looks.
 
         Returns:
-            Its message, None when time is up or the sender is gone.
+            Its message, that it was lost where that is known, None when time is up or the sender is gone.
         """
 
     def offer(self, state: StateMessage) -> None:

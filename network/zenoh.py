@@ -31,7 +31,7 @@ from network.messages import (
     StatusMessage,
     TruthMessage,
 )
-from network.transport import Links, Traffic
+from network.transport import Links, Loss, Traffic
 
 _DEPTHS: dict[type[PeerMessage], int] = {ConsensusMessage: 64, ConfirmMessage: 64, PixelsMessage: 4}
 _KEYS = {ConsensusMessage: keys.consensus, ConfirmMessage: keys.confirm, PixelsMessage: keys.pixels}
@@ -146,7 +146,7 @@ class ZenohTransport:
             self._answers.keep(str(publisher.key_expr), data)
         publisher.put(data)
 
-    def receive(self, sender: str, timeout_s: float) -> PeerMessage | None:
+    def receive(self, sender: str, timeout_s: float) -> PeerMessage | Loss | None:
         """The next valid message of a linked node, None when time is up or the sender is gone."""
         inbox = self._inboxes[sender]
         deadline = time.monotonic() + timeout_s

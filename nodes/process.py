@@ -18,7 +18,7 @@ from network.messages import (
     EstimateMessage,
     PixelsMessage,
 )
-from network.transport import Links, Transport
+from network.transport import Links, Loss, Transport
 from nodes.central import Central
 from nodes.pace import Pace
 from nodes.returning import LEAD, Returning
@@ -227,6 +227,8 @@ def _wait(node: SmartCamera, index: int, begun: float, patience_s: float, shell:
     message = shell.transport.receive(neighbor, min(left_s, patience_s))
     if isinstance(message, ConsensusMessage):
         _send(node.on_message(message), shell)
+    elif isinstance(message, Loss):
+        _send(node.on_loss(message), shell)
     elif not shell.transport.alive(neighbor):
         _send(node.on_lost(neighbor), shell)
     elif time.monotonic() >= deadline:

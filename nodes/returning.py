@@ -2,14 +2,15 @@
 
 In lockstep a neighbour that counts on a node cannot be in a later frame than the node's next one. Where all
 are, they have gone on: the node was stopped, cut off or has only just been started. It goes on from what the
-newest of them knows, some frames ahead of them: they hear it before they get there, and wait for it.
+newest of them knows, some frames ahead of them: they hear it before they get there, and wait for it. Where
+some are, the network was in parts, and those that are ahead wait.
 """
 
 import time
 from collections.abc import Iterable
 
 from network.messages import ConsensusMessage, StateMessage
-from network.transport import Transport
+from network.transport import Loss, Transport
 from nodes.pace import Pace
 from nodes.smart_camera import SmartCamera
 
@@ -50,9 +51,15 @@ class Returning:
             index: Its next frame.
         """
         for name in self._there():
-            while isinstance(message := self._transport.receive(name, 0), ConsensusMessage):
-                # Between two frames, nothing is said in return.
-                node.on_message(message)
+            # Between two frames, nothing is said in return.
+            while (message := self._transport.receive(name, 0)) is not None:
+                if isinstance(message, ConsensusMessage):
+                    node.on_message(message)
+                    # Parts of a network that hear each other again: who is ahead waits for the others.
+                    if self._pace.kind == "lockstep" and message.frame < index:
+                        node.on_behind(name)
+                elif isinstance(message, Loss):
+                    node.on_loss(message)
         if self._pace.kind == "lockstep":
             self._wait_for_company()
         heard = [node.heard[name] for name in self._there()]

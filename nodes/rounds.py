@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from network.consensus import Consensus
 from network.messages import ConsensusMessage
+from network.transport import Loss
 
 SILENT_ROUNDS = 12
 """Rounds in a row without a word of a neighbour after which it is gone: by 30% loss, one in a million."""
@@ -45,9 +46,13 @@ class Rounds:
         """Takes a neighbour's message; who was gone and speaks of these frames is counted on again."""
         self._silent.pop(message.sender, None)
         if message.sender in self.gone and message.frame > self._frame - len(self._lanes):
-            for lane in self._lanes:
-                lane.restore(message.sender)
+            self.restore(message.sender)
         return self.of(message.frame).receive(message)
+
+    def restore(self, neighbor: str) -> None:
+        """Counts on a neighbour again, from the next frame on."""
+        for lane in self._lanes:
+            lane.restore(neighbor)
 
     def lose(self, neighbor: str) -> Outgoing:
         """A neighbour is gone: the rounds go on without it."""
@@ -55,20 +60,24 @@ class Rounds:
         return sum((lane.drop(neighbor) for lane in self._lanes), ())
 
     def expire(self, frame: int) -> Outgoing:
-        """Does a frame's round without those that are late.
-
-        Who has said nothing for a whole dozen of rounds is taken to be gone.
-        """
+        """Does a frame's round without those that are late; they have been silent for one more."""
         self._silent.update(self.of(frame).waiting_for())
-        outgoing = self.of(frame).expire()
-        for name in sorted(name for name, rounds in self._silent.items() if rounds >= SILENT_ROUNDS):
-            outgoing += self.lose(name)
-        return outgoing
+        return self.of(frame).expire() + self._lose_the_silent()
+
+    def miss(self, loss: Loss) -> Outgoing:
+        """Does a round without a message that is lost; its sender has been silent for one more."""
+        self._silent[loss.sender] += loss.sender not in self.gone
+        return self.of(loss.frame).miss(loss.sender, loss.frame, loss.round) + self._lose_the_silent()
 
     def cut(self) -> None:
         """Ends the rounds of all frames."""
         for lane in self._lanes:
             lane.cut()
+
+    def _lose_the_silent(self) -> Outgoing:
+        """Who has said nothing for a whole dozen of rounds is taken to be gone."""
+        silent = sorted(name for name, rounds in self._silent.items() if rounds >= SILENT_ROUNDS)
+        return sum((self.lose(name) for name in silent), ())
 
     @property
     def gone(self) -> tuple[str, ...]:

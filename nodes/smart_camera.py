@@ -12,6 +12,7 @@ from jaxtyping import Float, UInt8
 
 from network.consensus import Consensus
 from network.messages import ConsensusMessage, EstimateMessage, PreviewMessage, StateMessage
+from network.transport import Loss
 from nodes.array_estimator import ArrayEstimator
 from nodes.estimator import SirEstimator
 from nodes.filtering.fusion import fuse, is_density, left_of, pack, propagate, unpack
@@ -99,6 +100,10 @@ class SmartCamera:
         """A neighbour's value of a round has come; one that was gone is counted on again."""
         return self._with_result(self._rounds.receive(message))
 
+    def on_loss(self, loss: Loss) -> Outgoing:
+        """A neighbour's value of a round is lost: nobody waits for it."""
+        return self._with_result(self._rounds.miss(loss))
+
     def on_return(self, image: UInt8[np.ndarray, "H W 3"], state: StateMessage) -> None:
         """The camera was away: it goes on with what a neighbour knows.
 
@@ -121,6 +126,10 @@ class SmartCamera:
             self._appearance = unpack_looks(state.looks, setup.filter.color)
             # its own filter, the baseline, has nobody to ask
             self._single = None
+
+    def on_behind(self, neighbor: str) -> None:
+        """A neighbour is some frames behind: from the next frame on, it is waited for."""
+        self._rounds.restore(neighbor)
 
     def on_lost(self, neighbor: str) -> Outgoing:
         """A neighbour is gone: the rounds go on without it."""

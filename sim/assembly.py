@@ -91,18 +91,6 @@ class Assembly:
             self.scenario.lag_frames,
         )
 
-    def require_real_links(self) -> None:
-        """Checks that the run can be one of processes, whose links are what they are.
-
-        Raises:
-            ScenarioError: The scenario says what links do.
-        """
-        if not self.scenario.network.conditions.are_perfect:
-            raise ScenarioError(
-                f"{self.scenario.name}: network.conditions act in virtual time: add --in-process, or take"
-                " them out, for real links are what they are"
-            )
-
     def prepare(self) -> None:
         """Works out what all nodes share, before they part."""
         _ = self.cameras, self.links, self.algorithm, self.setup

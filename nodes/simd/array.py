@@ -185,16 +185,21 @@ class ProcessorArray(LaneMachine):
         """One word of several as an operand, 0 being the lowest."""
         return (self._value(word) >> index * self.options.bits) & ((1 << self.options.bits) - 1)
 
-    def indexed(self, words: Sequence[Word], index: int | Int[np.ndarray, "n 1"]) -> Operand:
+    def indexed(self, words: Sequence[Word], index: int | Int[np.ndarray, "..."]) -> Operand:
         """The word whose address the control processor counts up in a loop, as an operand."""
         if isinstance(index, int):
             return words[index]
-        return np.stack([self._value(words[i]) for i in index[:, 0]])
+        return np.stack([self._value(words[i]) for i in index.ravel()]).reshape(*index.shape[:-1], self.n)
 
     # From one element to the next, and from one iteration to the next
 
     def neighbour(self, word: Word, offset: int) -> Lanes:
-        """The word of the neighbour at +1 (right) or -1 (left), as an operand; 0 beyond the last element."""
+        """The word of the neighbour at +1 (right) or -1 (left), as an operand; 0 beyond the last element.
+
+        Raises:
+            ValueError: The lanes are those of several passes.
+        """
+        self._require_neighbours()
         value = self._value(word)
         moved = np.zeros_like(value)
         here, there = (slice(None, -1), slice(1, None))[:: 1 if offset > 0 else -1]
@@ -202,12 +207,21 @@ class ProcessorArray(LaneMachine):
         return moved
 
     def shift(self, word: Word, offset: int) -> None:
-        """Each element takes the word of its neighbour at `offset`, in a loop once in every iteration."""
+        """Each element takes the word of its neighbour at `offset`, in a loop once in every iteration.
+
+        Raises:
+            ValueError: The lanes are those of several passes.
+        """
+        self._require_neighbours()
         if self._loop is None:
             self.copy(word, self.neighbour(word, offset))
             return
         self._count(load=word.n_words, store=word.n_words)
         word.value = self._loop.shifted(word, offset)
+
+    def _require_neighbours(self) -> None:
+        if not self.has_neighbours:
+            raise ValueError("the lanes are pieces of work, of which none has a neighbour: leave out lanes")
 
     def accumulate(self, total: Word, a: Operand, when: Flag | None = None) -> None:
         """Adds a to total, also over the iterations of a loop."""
@@ -238,10 +252,12 @@ class ProcessorArray(LaneMachine):
     def fetch(self, target: Word, memory: ExternalMemory, column: Word, row: Word, active: slice) -> None:
         """The input processor reads the pixel that each active element asks for; -1 outside the picture."""
         columns, rows = self._value(column)[..., active], self._value(row)[..., active]
-        self._cost.external_reads += columns.shape[-1] * (self._loop.n if self._loop else 1)
+        self._cost.external_reads += columns.shape[-1] * self._iterations
         pixels = memory.read(columns, rows)
-        value = np.full((*pixels.shape[:-1], self.n), -1, pixels.dtype)
-        value[..., active] = pixels
+        value = pixels
+        if pixels.shape[-1] < self.n:
+            value = np.full((*pixels.shape[:-1], self.n), -1, pixels.dtype)
+            value[..., active] = pixels
         self._store(target, value, None)
 
     def output(
@@ -249,13 +265,13 @@ class ProcessorArray(LaneMachine):
     ) -> None:
         """The digital output processor stores the first elements of a line in the external memory."""
         width = memory.pixels.shape[1]
-        self._cost.external_writes += width * (self._loop.n if self._loop else 1)
+        self._cost.external_writes += width * self._iterations
         memory.pixels[rows] = self._value(word)[..., :width]
 
     def collect(self, word: Word, elements: slice) -> Num[np.ndarray, "..."]:
         """The digital output processor takes the words of some elements to the external memory."""
         values = self._value(word)[..., elements]
-        self._cost.external_writes += values.shape[-1] * (self._loop.n if self._loop else 1)
+        self._cost.external_writes += values.shape[-1] * self._iterations
         return values
 
     def peek(self, word: Word, element: int) -> Scalar:

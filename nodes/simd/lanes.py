@@ -1,6 +1,6 @@
 """The lanes of the array: words, loops and counts, under the instructions."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -25,15 +25,23 @@ class LaneMachine:
 
     Args:
         options: The processor.
-        batching: Whether loops run all iterations at once; the words and the counts are the same either way.
+        batching: Whether loops run all iterations, and routines all steps, at once; the words and the counts
+            are the same either way.
+        lanes: How many pieces of work there are for one element each, if not one for every element. As many
+            passes of the whole program as they take run side by side, and no lane has a neighbour.
+
+    Attributes:
+        n: The lanes.
     """
 
-    def __init__(self, options: SimdOptions, *, batching: bool = True) -> None:
+    def __init__(self, options: SimdOptions, *, batching: bool = True, lanes: int | None = None) -> None:
         self.options = options
-        self.n = options.processing_elements
+        self.n = options.processing_elements if lanes is None else lanes
+        self.has_neighbours = lanes is None
+        self._passes = max(1, -(-self.n // options.processing_elements))
         self.line_memory = LineMemory(options.words)
         self.costs: dict[str, Cost] = {}
-        self._batching = batching
+        self.batching = batching
         self._loop: Loop | None = None
         self._cost = Cost()
 
@@ -48,10 +56,31 @@ class LaneMachine:
         finally:
             self._cost = before
 
+    def at_once(self, cost: Cost, target: Word, result: Callable[..., Lanes], *operands: Word) -> None:
+        """Stores what the steps of a routine would leave in a word.
+
+        Args:
+            cost: What the steps cost, which does not depend on the data.
+            target: The word.
+            result: What they leave there, in closed form.
+            operands: What it is made from.
+        """
+        self._cost.add(cost, times=self._times)
+        self._store(target, result(*map(self._value, operands)).astype(target.dtype, copy=False), None)
+
+    @property
+    def _times(self) -> int:
+        """How often an instruction is done: in each pass, and in each iteration."""
+        return self._passes * self._iterations
+
+    @property
+    def _iterations(self) -> int:
+        return self._loop.iterations if self._loop else 1
+
     def _count(self, **instructions: int) -> None:
-        times = self._loop.n if self._loop else 1
+        times, counted = self._times, self._cost.instructions
         for kind, n in instructions.items():
-            self._cost.instructions[kind] += n * times
+            counted[kind] += n * times
 
     # Line memory
 
@@ -101,7 +130,7 @@ class LaneMachine:
             value = _chosen(when, value, old)
         if self._loop:
             self._loop.write(target)
-        if np.ndim(value) == 0:
+        if not isinstance(value, np.ndarray) or not value.ndim:
             value = np.full(self.n, value, target.dtype)
         elif value.shape[-1] != self.n:
             value = np.broadcast_to(value, (*value.shape[:-1], self.n))
@@ -109,26 +138,24 @@ class LaneMachine:
 
     # Loops
 
-    def repeat(self, n: int) -> Iterator[int | Int[np.ndarray, "n 1"]]:
+    def repeat(self, n: int) -> Iterator[int | Int[np.ndarray, "..."]]:
         """A loop of the control processor; yields its counter.
 
         With batching, all iterations run at once on a leading axis. What one leaves to the next must go
-        through `accumulate`, `shift` or `keep`.
+        through `accumulate`, `shift` or `keep`; in a loop inside of another, through `accumulate`.
 
         Raises:
             ValueError: An iteration reads what the one before has written.
         """
-        if not self._batching:
+        if not self.batching:
             yield from range(n)
             return
-        if self._loop:
-            raise ValueError("loops that run all iterations at once do not nest: use range for the inner one")
-        self._loop = Loop(n)
+        around, self._loop = self._loop, Loop(n, self._loop)
         try:
-            yield np.arange(n, dtype=np.int32)[:, None]
+            yield self._loop.counter
             self._loop.finish()
         finally:
-            self._loop = None
+            self._loop = around
 
 
 def _chosen(when: Flag, value: Any, old: Lanes) -> Lanes:

@@ -95,10 +95,12 @@ class SimdLikelihood:
             pattern: The reference.
             picture_px: Width and height of the whole picture, which the array bins.
         """
-        array = ProcessorArray(self.options, batching=self._batching)
+        n_elements = self.options.processing_elements
+        n_lanes = len(boxes) if self._batching else n_elements
+        array = ProcessorArray(self.options, batching=self._batching, lanes=n_lanes)
         array.costs[Step.BINNING] = Cost()
         array.costs[Step.BINNING].add(
-            line_cost(self.options, self._color), times=picture_px[1] * -(-picture_px[0] // array.n)
+            line_cost(self.options, self._color), times=picture_px[1] * -(-picture_px[0] // n_elements)
         )
         picture = store_picture(bins, self._color.n_bins, self.options.bits)
         boxes = np.where(np.isnan(boxes), -1e6, boxes)
@@ -106,21 +108,20 @@ class SimdLikelihood:
         counts = np.empty((len(boxes), len(pattern.book.part)), int)
         pixels = np.empty((len(boxes), len(parts)), int)
         ratio = np.empty(len(boxes))
-        for first in range(0, len(boxes), array.n):
-            of_pass = slice(first, first + array.n)
+        for first in range(0, len(boxes), max(n_lanes, 1)):
+            of_pass = slice(first, first + n_lanes)
             one_pass = _Pass(array, picture, boxes[of_pass])
             counts[of_pass], pixels[of_pass], ratio[of_pass] = one_pass.run(parts)
-        self.report = FrameReport.of(array, picture_px[1], min(len(boxes), array.n))
+        self.report = FrameReport.of(array, picture_px[1], min(len(boxes), n_elements))
         return Measurement(counts, pixels, 1 - ratio)
 
     def _parts(self, pattern: Pattern) -> list[Part]:
-        columns, n_columns = self._columns, len(self._columns)
         of_codes = np.argwhere(pattern.book.codes < len(pattern.book.part))
         slices = rows_of_parts(self._n_rows, self._kernel, pattern.book.part_heights)
         return [
             Part(
-                np.tile(columns, rows.stop - rows.start),
-                np.repeat(self._rows[rows], n_columns),
+                self._columns,
+                self._rows[rows],
                 of_codes[first:last, 1],
                 of_codes[first:last, 2],
                 pattern.scale[first:last],
@@ -189,7 +190,7 @@ class _Pass:
                     with array.step(Step.DISTANCES):
                         add_part(array, own, words, which, part, scale, scale.shifts[index])
             with array.step(Step.DISTANCES):
-                normalize_part(array, own, pixels, len(part.rows))
+                normalize_part(array, own, pixels, part.n_samples)
                 array.add(coefficient, coefficient, own)
                 inside = array.less(0, pixels)
                 array.add(perfect, perfect, scale.held(part.perfect), when=inside)

@@ -59,22 +59,20 @@ class Word:
 
 
 class LineMemory:
-    """Counts the words of a processing element by what they are for."""
+    """Counts the words of a processing element by what they are for.
+
+    Attributes:
+        size: Words that there are.
+        used: Words in use now.
+        high_water: The most words that were ever in use at once.
+    """
 
     def __init__(self, size: int) -> None:
         self.size = size
+        self.used = 0
+        self.high_water = 0
         self._used: Counter[str] = Counter()
         self._peak: Counter[str] = Counter()
-
-    @property
-    def used(self) -> int:
-        """Words in use now."""
-        return self._used.total()
-
-    @property
-    def high_water(self) -> int:
-        """The most words that were ever in use at once."""
-        return self._peak.total()
 
     @property
     def table(self) -> MappingProxyType[str, int]:
@@ -94,12 +92,14 @@ class LineMemory:
                 f" {n_words} more are needed for {owner}: use fewer bins or particles' words, or set words"
             )
         self._used[owner] += n_words
+        self.used += n_words
         if self.used > self.high_water:
-            self._peak = self._used.copy()
+            self.high_water, self._peak = self.used, self._used.copy()
 
     def free(self, owner: str, n_words: int) -> None:
         """Gives words back."""
         self._used[owner] -= n_words
+        self.used -= n_words
 
 
 class ExternalMemory:

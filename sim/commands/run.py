@@ -69,8 +69,6 @@ def run(
     # What is wrong with the start or the truth shall be said before anything is written.
     _ = assembly.start, assembly.truth
     _check_by_hand(by_hand or [], assembly, in_process=in_process)
-    if not in_process:
-        assembly.require_real_links()
     tell_advice(chosen)
     if live and in_process:
         raise typer.BadParameter("with --in-process, nothing goes over the network", param_hint="--live")

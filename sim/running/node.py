@@ -7,6 +7,9 @@ from collections.abc import Sequence
 import cv2
 from threadpoolctl import threadpool_limits
 
+from network.conditions import Channel
+from network.disturbed import DisturbedTransport
+from network.transport import Transport
 from network.zenoh import ZenohTransport
 from nodes.process import Shell, run_camera, run_central
 from sim.assembly import Assembly
@@ -32,15 +35,24 @@ def run_node(
         SourceError: The camera's video cannot be read.
     """
     scenario = assembly.scenario
-    assembly.require_real_links()
     if name not in assembly.links:
         raise ScenarioError(f"{scenario.name} has no node {name}: its nodes are {', '.join(assembly.links)}")
     # One thread a process: as many processes as cameras share the cores.
     cv2.setNumThreads(1)
     threadpool_limits(1)
     links = assembly.links[name]
-    late_is_lost = scenario.pace == "realtime"
-    transport = ZenohTransport(scenario.name, name, links, listen, connect, drop_late_pixels=late_is_lost)
+    realtime = scenario.pace == "realtime"
+    transport: Transport
+    if scenario.network.conditions.are_perfect or links.cameras:
+        transport = ZenohTransport(scenario.name, name, links, listen, connect, drop_late_pixels=realtime)
+    else:
+        channels = {
+            other: Channel(scenario.network.conditions, scenario.seed, other, name)
+            for other in links.neighbors
+        }
+        transport = DisturbedTransport(
+            scenario.name, name, links, listen, connect, channels, realtime=realtime
+        )
     shell = Shell(name, transport, assembly.pace, scenario.frames, stopped)
     try:
         if links.cameras:

@@ -12,25 +12,36 @@ from sim.world.texture import Texture
 from sim.world.walls import WALL_TEXEL_M
 
 _FINE = 2  # lines of sight for every pixel and axis
+_STRIP_PX = 32
+"""Rows that are drawn at once: the whole picture would take more memory than all that a node does later."""
 
 
-def lines_of_sight(camera: Camera) -> Float[np.ndarray, "h w 3"]:
-    """Directions in the world, not of unit length, through a grid twice as fine as the pixels."""
-    pixels = np.stack(np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px)), axis=-1)
+def lines_of_sight(camera: Camera, rows: range | None = None) -> Float[np.ndarray, "h w 3"]:
+    """Directions in the world, not of unit length, through a grid twice as fine as the pixels.
+
+    Args:
+        camera: The camera.
+        rows: The rows of pixels that are wanted; None for all.
+    """
+    rows = range(camera.height_px) if rows is None else rows
+    # with the rows beside them, for whatever lies between two rows
+    around = range(max(rows.start - 1, 0), min(rows.stop + 1, camera.height_px))
+    pixels = np.stack(np.meshgrid(np.arange(camera.width_px), np.arange(around.start, around.stop)), axis=-1)
     if camera.distortion.any():
         # the inverse of the distortion has no closed form: OpenCV iterates
         x, y = (
             cv2.undistortPoints(pixels.reshape(-1, 1, 2).astype(np.float64), camera.K, camera.distortion)
-            .reshape(camera.height_px, camera.width_px, 2)
+            .reshape(len(around), camera.width_px, 2)
             .transpose(2, 0, 1)
         )
     else:
         y = (pixels[..., 1] - camera.K[1, 2]) / camera.K[1, 1]
         x = (pixels[..., 0] - camera.K[0, 2] - camera.K[0, 1] * y) / camera.K[0, 0]
-    size = (_FINE * camera.width_px, _FINE * camera.height_px)
+    size = (_FINE * camera.width_px, _FINE * len(around))
     # K⁻¹ [u, v, 1]ᵀ in camera axes, Rᵀ of it in world axes
     rays = np.stack([x, y, np.ones_like(x)], axis=-1) @ camera.R
-    return cv2.resize(rays.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
+    fine = cv2.resize(rays.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
+    return fine[_FINE * (rows.start - around.start) :][: _FINE * len(rows)]
 
 
 def require_inside(camera: Camera, room: RoomOptions) -> None:
@@ -59,8 +70,17 @@ def empty_room(camera: Camera, room: RoomOptions, interior: Interior) -> UInt8[n
         ValueError: The camera hangs outside the room.
     """
     require_inside(camera, room)
+    picture = np.empty((camera.height_px, camera.width_px, 3), np.uint8)
+    for top in range(0, camera.height_px, _STRIP_PX):
+        rows = range(top, min(top + _STRIP_PX, camera.height_px))
+        picture[rows.start : rows.stop] = _strip(camera, rows, room, interior)
+    return picture
+
+
+def _strip(camera: Camera, rows: range, room: RoomOptions, interior: Interior) -> UInt8[np.ndarray, "h W 3"]:
+    """Some rows of the empty room."""
     x, y, z = camera.center.tolist()
-    dx, dy, dz = np.ascontiguousarray(np.moveaxis(lines_of_sight(camera), -1, 0))
+    dx, dy, dz = np.ascontiguousarray(np.moveaxis(lines_of_sight(camera, rows), -1, 0))
     reach = distance_to_wall(room, camera.center[:2], dx, dy)
     at_wall_z = z + reach * dz
     on_floor, on_ceiling = at_wall_z < 0, at_wall_z > room.height
@@ -76,7 +96,7 @@ def empty_room(camera: Camera, room: RoomOptions, interior: Interior) -> UInt8[n
         (on_ceiling, interior.ceiling, column, row, CEILING_TEXEL_M),
     ):
         _paint(fine, where, texture, right / texel_m - 0.5, down / texel_m - 0.5)
-    return cv2.resize(fine, (camera.width_px, camera.height_px), interpolation=cv2.INTER_AREA)
+    return cv2.resize(fine, (camera.width_px, len(rows)), interpolation=cv2.INTER_AREA)
 
 
 def _paint(

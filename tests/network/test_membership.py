@@ -156,3 +156,17 @@ def test_a_report_runs_out_when_it_has_crossed_the_network():
     membership = Membership("A", graph.path(NAMES), 3)  # 7 links, 3 rounds: 3 frames
     membership.hear([(6, 10)], 10)
     assert [membership.members(frame) == NAMES for frame in (10, 12, 13)] == [False, False, True]
+
+
+def test_who_is_behind_counts_by_its_own_frame_whatever_those_ahead_tell():
+    net = graph.path(["A", "B", "C"])
+    node = Consensus("B", ("A", "C"), MetropolisWeights(), 3, membership=Membership("B", net, 3))
+    node.drop("C")
+    # C, which has been apart, is eight frames ahead, and tells of the link there
+    number = sorted(net.edges).index(("B", "C"))
+    node.receive(ConsensusMessage("C", 9, 1, 0, np.array([0.0]), down=((number, 9),)))
+    node.restore("C")
+
+    node.begin(1, np.array([1.0]))
+
+    assert node.members == ("A", "B")

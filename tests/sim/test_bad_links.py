@@ -10,7 +10,6 @@ from sim.running.in_process import run_in_process
 from sim.running.results import Results, summarize
 from sim.scenario.advice import advice
 from sim.scenario.loading import load_scenario
-from sim.scenario.parsing import ScenarioError
 
 LOSS = ("network.conditions.loss", "0.3")
 DELAY = ("network.conditions.delay_s", "0.1")
@@ -133,12 +132,6 @@ def test_parts_agree_among_themselves_and_the_network_again_afterwards(small):
     assert max(apart["AB"], apart["CD"]) < min(apart["AD"], apart["BC"])
     # what was sent between the parts is lost: two links, both ways
     assert summary["network"]["lost"] == 4 * 12 * 4
-
-
-def test_conditions_are_for_runs_in_one_process(small):
-    with pytest.raises(ScenarioError, match="conditions act in virtual time: add --in-process"):
-        Assembly(load_scenario(small, [LOSS])).require_real_links()
-    Assembly(load_scenario(small)).require_real_links()
 
 
 def test_where_links_lose_the_robust_preset_takes_ratio_consensus(small):

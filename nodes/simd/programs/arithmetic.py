@@ -1,22 +1,36 @@
-"""Division, square root and exponential, in steps whose number does not depend on the data."""
+"""Division, square root and exponential, in steps whose number does not depend on the data.
+
+Where the array may run all at once, the steps of a division and of a root are run and counted a single time,
+and their exact results computed from then on.
+"""
+
+from collections.abc import Callable
+from functools import lru_cache, partial
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from nodes.simd.array import ProcessorArray
+from nodes.simd.cost import Cost
 from nodes.simd.memory import Word
+from nodes.simd.options import SimdOptions
 
 
 def divide(array: ProcessorArray, dividend: Word, divisor: Word) -> None:
     """Leaves ⌊dividend / divisor⌋ in the dividend, by restoring division, a step for each bit.
 
     The program memory is small and one routine serves the colours, the weights and the mean, so that it takes
-    what all of them need: several words on both sides. What dividing by 0 gives means nothing.
+    what all of them need: several words on both sides. What dividing by 0 gives means nothing: all ones.
     """
     if dividend.real:
         array.real(dividend, _quotient, dividend, divisor)
         return
     with array.using(array.word(n_words=divisor.n_words)) as (remainder,):
+        if array.batching:
+            cost = _cost(divide, array.options, dividend.n_words, divisor.n_words)
+            all_ones = (1 << dividend.bits) - 1
+            array.at_once(cost, dividend, partial(_whole_quotient, all_ones), dividend, divisor)
+            return
         # Shifted, it may have a bit more than the divisor: the carry, which the comparison heeds.
         remainder.bits += 1
         array.copy(remainder, 0)
@@ -41,6 +55,11 @@ def square_root(array: ProcessorArray, root: Word, square: Word) -> None:
         return
     trial, product = array.word(n_words=root.n_words), array.word(n_words=square.n_words)
     with array.using(trial, product):
+        if array.batching:
+            array.at_once(
+                _cost(square_root, array.options, root.n_words, square.n_words), root, np.sqrt, square
+            )
+            return
         array.copy(root, 0)
         for bit in reversed(range(root.bits)):
             array.add(trial, root, 1 << bit)
@@ -72,6 +91,22 @@ def exponential(array: ProcessorArray, result: Word, exponent: Word, integer_bit
             flag = array.bit(exponent, bit)
             array.multiply(product, product, factor, b_words=n_words, drop=n_words, when=flag)
         array.high_words(result, product)
+
+
+@lru_cache
+def _cost(routine: Callable[..., None], options: SimdOptions, *n_words: int) -> Cost:
+    """What a routine costs on words of these lengths: it is run and counted."""
+    array = ProcessorArray(options, batching=False)
+    with array.step("") as cost:
+        routine(array, *(array.word(n_words=n) for n in n_words))
+    return cost
+
+
+def _whole_quotient(
+    by_zero: int, dividend: Int[np.ndarray, "..."], divisor: Int[np.ndarray, "..."]
+) -> Int[np.ndarray, "..."]:
+    everywhere = np.full(np.broadcast_shapes(dividend.shape, divisor.shape), by_zero, dividend.dtype)
+    return np.floor_divide(dividend, divisor, out=everywhere, where=divisor != 0)
 
 
 def _quotient(

@@ -26,20 +26,25 @@ class Part:
     """What is counted in one part of the boxes.
 
     Attributes:
-        columns: Of the samples as fractions of the box, 0 to 1.
-        rows: Of the samples.
+        columns: Of the grid of samples, as fractions of the box, 0 to 1.
+        rows: Of the grid.
         channels: Of each colour that is told apart.
         bins: Its bin in the channel.
         weights: W, what the root of its share counts in the coefficient.
         perfect: The coefficient of a box that shows the reference.
     """
 
-    columns: Float[np.ndarray, " S"]
-    rows: Float[np.ndarray, " S"]
+    columns: Float[np.ndarray, " C"]
+    rows: Float[np.ndarray, " R"]
     channels: Int[np.ndarray, " K"]
     bins: Int[np.ndarray, " K"]
     weights: Float[np.ndarray, " K"]
     perfect: float
+
+    @property
+    def n_samples(self) -> int:
+        """How many samples a box has in this part."""
+        return len(self.columns) * len(self.rows)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,12 +89,12 @@ def scale_of(parts: Sequence[Part], options: SimdOptions) -> Scale:
     if options.arithmetic == "float":
         return Scale(1.0, (0,) * len(parts), 1)
     full = (1 << options.number_bits) - 1
-    shifts = tuple(int(math.log2(full / max(len(part.rows), 1))) for part in parts)
+    shifts = tuple(int(math.log2(full / max(part.n_samples, 1))) for part in parts)
     greatest = sum(
         math.sqrt(len(np.unique(part.channels)) * float(np.square(part.weights).sum())) for part in parts
     )
     limits = [
-        math.sqrt(full * len(part.rows) * (1 << shift)) / part.weights.max()
+        math.sqrt(full * part.n_samples * (1 << shift)) / part.weights.max()
         for part, shift in zip(parts, shifts, strict=True)
         if len(part.weights)
     ]
@@ -159,45 +164,39 @@ def count_part(
         *(array.word(n_words=2, signed=True) for _ in "xy"),
     )
     pixel, own = array.word("Video line buffers"), array.word()
+    height, width = picture.memories[0].pixels.shape
     with array.using(position, column, row, pixel, own):
-        for sample in array.repeat(len(part.rows)):
-            _locate(array, (column, row), sample, part, boxes, picture.memories[0], position)
-            for number, memory in enumerate(picture.memories):
-                array.fetch(pixel, memory, column, row, active)
-                if number == 0:
-                    inside = array.at_least(pixel, 0)
-                    array.accumulate(pixels, 1, when=inside)
-                shared = len(picture.memories) == 1
-                for channel in np.unique(channels) if shared else [number]:
-                    seen = pixel
-                    if shared and channels.max(initial=0) > 0:
-                        # the channel's bits of the element, or no bin at all
-                        array.shift_right(own, pixel, picture.bits * int(channel))
-                        array.mask(own, own, picture.bits)
-                        array.copy(own, 1 << picture.bits, when=array.neither(inside))
-                        seen = own
-                    for i in np.flatnonzero(channels == channel).tolist():
-                        array.accumulate(words[i], 1, when=array.equal(seen, int(bins[i])))
+        for down in array.repeat(len(part.rows)):
+            _locate(array, row, part.rows[down], boxes.top, boxes.height, height, position)
+            for along in array.repeat(len(part.columns)):
+                _locate(array, column, part.columns[along], boxes.left, boxes.width, width, position)
+                for number, memory in enumerate(picture.memories):
+                    array.fetch(pixel, memory, column, row, active)
+                    if number == 0:
+                        inside = array.at_least(pixel, 0)
+                        array.accumulate(pixels, 1, when=inside)
+                    shared = len(picture.memories) == 1
+                    for channel in np.unique(channels) if shared else [number]:
+                        seen = pixel
+                        if shared and channels.max(initial=0) > 0:
+                            # the channel's bits of the element, or no bin at all
+                            array.shift_right(own, pixel, picture.bits * int(channel))
+                            array.mask(own, own, picture.bits)
+                            array.copy(own, 1 << picture.bits, when=array.neither(inside))
+                            seen = own
+                        for i in np.flatnonzero(channels == channel).tolist():
+                            array.accumulate(words[i], 1, when=array.equal(seen, int(bins[i])))
 
 
 def _locate(
-    array: ProcessorArray,
-    targets: tuple[Word, Word],
-    sample: Any,
-    part: Part,
-    boxes: BoxWords,
-    memory: ExternalMemory,
-    position: Word,
+    array: ProcessorArray, target: Word, fraction: Any, low: Word, extent: Word, size: int, position: Word
 ) -> None:
-    """Column and row of a sample, ⌊low + fraction · extent⌋; the picture's border where it is outside."""
-    height, width = memory.pixels.shape
-    axes = ((part.columns, boxes.left, boxes.width, width), (part.rows, boxes.top, boxes.height, height))
-    for target, (fractions, low, extent, size) in zip(targets, axes, strict=True):
-        array.multiply(position, extent, fractions[sample])
-        array.add(position, position, low)
-        array.maximum(position, position, -1)
-        array.minimum(position, position, size)
-        array.shift_right(target, position, 0)
+    """Column or row of a sample, ⌊low + fraction · extent⌋; the picture's border where it is outside."""
+    array.multiply(position, extent, fraction)
+    array.add(position, position, low)
+    array.maximum(position, position, -1)
+    array.minimum(position, position, size)
+    array.shift_right(target, position, 0)
 
 
 def add_part(
@@ -211,7 +210,7 @@ def add_part(
 ) -> None:
     """Coefficient += Σ W √n of some colours of a part."""
     # W √(n / S) = √(n 2^s · W² / (S 2^s)), scaled
-    squares = (scale.coefficient * part.weights[which]) ** 2 / (len(part.rows) * (1 << shift))
+    squares = (scale.coefficient * part.weights[which]) ** 2 / (part.n_samples * (1 << shift))
     root = array.number()
     if not root.real:
         squares = np.rint(squares).astype(np.int64)

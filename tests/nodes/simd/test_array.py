@@ -98,6 +98,49 @@ def test_all_iterations_at_once_leave_the_same_words_and_counts_as_one_by_one(se
     assert cost == expected_cost
 
 
+@given(st.integers(0, 2**32 - 1), st.integers(1, 7), st.integers(1, 9))
+def test_loops_in_loops_leave_the_same_words_and_counts_as_one_by_one(seed, n_around, n_inside):
+    rng = np.random.default_rng(seed)
+    values = rng.integers(0, 1 << 10, P)
+    rows, columns = rng.integers(0, 1 << 10, n_around), rng.integers(0, 1 << 10, n_inside)
+
+    def program(array):
+        start, total = loaded(array, values), array.word(n_words=2)
+        flagged, around, row, both, last = (array.word() for _ in range(5))
+        with array.step("program") as cost:
+            for r in array.repeat(n_around):
+                array.add(row, start, rows[r])
+                array.accumulate(around, row)
+                for c in array.repeat(n_inside):
+                    array.add(both, row, columns[c])
+                    array.accumulate(total, both)
+                    array.accumulate(flagged, 1, when=array.less(both, start))
+                array.copy(last, both)
+        return [word.value for word in (start, total, flagged, around, row, both, last)], cost
+
+    words, cost = program(ProcessorArray(SMALL))
+    expected, expected_cost = program(ProcessorArray(SMALL, batching=False))
+    np.testing.assert_array_equal(words, expected)
+    assert cost == expected_cost
+
+
+def test_lanes_of_several_passes_cost_all_of_them_and_have_no_neighbours():
+    def summed(array):
+        total = array.word()
+        with array.step("sums") as cost:
+            for _ in array.repeat(5):
+                array.accumulate(total, 3)
+        return total.value, cost
+
+    array = ProcessorArray(SMALL, lanes=2 * P + 1)
+    total, cost = summed(array)
+    assert total.tolist() == [15] * (2 * P + 1)
+    once = summed(ProcessorArray(SMALL))[1]
+    assert cost.cycles == 3 * once.cycles
+    with pytest.raises(ValueError, match="none has a neighbour"):
+        array.neighbour(array.word(), 1)
+
+
 def test_what_one_iteration_leaves_to_the_next_in_another_way_is_refused():
     array = ProcessorArray(SMALL)
     x, y = array.word(), array.word()
@@ -113,13 +156,14 @@ def test_what_one_iteration_leaves_to_the_next_in_another_way_is_refused():
 
     def nested():
         for _ in array.repeat(3):
-            list(array.repeat(2))
+            for _ in array.repeat(2):
+                array.shift(x, 1)
 
     with pytest.raises(ValueError, match="is carried from one iteration to the next"):
         counted_up()
     with pytest.raises(ValueError, match="read it afterwards"):
         read_too_early()
-    with pytest.raises(ValueError, match="do not nest"):
+    with pytest.raises(ValueError, match="in a loop inside of another only sums go on"):
         nested()
 
 

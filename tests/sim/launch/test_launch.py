@@ -47,6 +47,36 @@ def test_a_grid_of_sixteen_cameras_is_the_same_in_processes_as_in_one(launched, 
     assert (launched.out / "estimates.jsonl").read_bytes() == (alone / "estimates.jsonl").read_bytes()
 
 
+def test_bad_links_are_the_same_in_processes_as_in_one(launched, tmp_path, small):
+    bad = {"loss": "0.3", "duplicates": "0.2", "delay_s": "0.1"}
+    keys = {f"network.conditions.{key}": value for key, value in bad.items()}
+    settings = [each for key, value in keys.items() for each in ("--set", f"{key}={value}")]
+    launched.run(small, *settings, "--json")
+
+    code, stdout, stderr = launched.end()
+
+    assert code == 0, stderr
+    summary = json.loads(stdout)
+    assert summary["network"]["lost"] > 0
+    assert summary["network"]["duplicated"] > 0
+    assert summary["network"]["late"] == 0
+    alone = recorded_in_process(tmp_path / "alone", small, *keys.items())
+    assert (launched.out / "estimates.jsonl").read_bytes() == (alone / "estimates.jsonl").read_bytes()
+
+
+def test_parts_of_a_network_go_on_apart_and_find_each_other_again(launched, small):
+    parted = "[{groups: [[A, B], [C, D]], first_frame: 4, frames: 4}]"
+    settings = ("--set", f"network.conditions.partitions={parted}", "--set", "network.iterations=12")
+    launched.run(small, "--frames", 16, *settings, "--json")
+
+    code, stdout, stderr = launched.end()
+
+    assert code == 0, stderr
+    members = json.loads(stdout)["members"]["per_frame"]
+    assert [members[name][7] for name in "ABCD"] == [2] * 4
+    assert [members[name][-1] for name in "ABCD"] == [4] * 4
+
+
 def test_scene_1_is_the_same_in_processes_as_in_one_and_is_heard_from_outside(launched, dcpf, tmp_path):
     scene = ROOT / "scenarios" / "scene1.yaml"
     watch = launched.beside(*dcpf, "watch", "--json", "--connect", launched.router)
