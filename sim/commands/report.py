@@ -35,17 +35,17 @@ def report(
             from sim.recording.filmed import opened
 
             results, assembly = stack.enter_context(opened(run))
+            _require_estimates(results, run)
             summary, scenario = _told(results), as_yaml(as_run(results.scenario))
             film, folder = run, run.parent
         else:
             results = read_run(run)
             assembly = Assembly(results.scenario)
+            _require_estimates(results, run)
             # Of a run that was cut off, what its estimates tell.
             summary = read_summary(run) or summarize(results, processes=0)
             scenario = (run / "scenario.yaml").read_text(encoding="utf-8")
             film, folder = run / FILM, run
-        if not results.tracks:
-            raise RecordingError(f"{run}: has no estimates yet: there is nothing to report")
         bar = stack.enter_context(progress_bar("report: frames", results.scenario.frames))
         page = run_report(
             results,
@@ -61,6 +61,11 @@ def report(
     except OSError as error:
         raise RecordingError(f"{path}: cannot be written: {error.strerror}: name another --out") from error
     Console(highlight=False).print(str(path), soft_wrap=True)
+
+
+def _require_estimates(results: Results, run: Path) -> None:
+    if not results.tracks:
+        raise RecordingError(f"{run}: has no estimates yet: there is nothing to report")
 
 
 def _told(results: Results) -> Mapping[str, Any]:
