@@ -51,9 +51,7 @@ def why_not_flat(groups: Sequence[GroupFindings], allowed: float) -> Iterator[st
         never = ~lost.any(axis=0)
         if never.any():
             kept = np.ptp([float(group.rmse("dcpf")[never].mean()) for group in groups])
-            sentence += (
-                f"; in the {never.sum()} runs that keep it everywhere, it changes by {kept:.3f} {unit}"
-            )
+            sentence += f"; over the runs that never lose it, {never.sum()}, it changes by {kept:.3f} {unit}"
         yield f"{sentence}."
 
     if groups[0].has("cpf"):
@@ -90,19 +88,23 @@ def why_not_within(groups: Sequence[GroupFindings], worst: GroupFindings, allowe
             sentence += f"; where neither does, the ratio is {ours[kept].mean() / theirs[kept].mean():.2f}"
         yield f"{sentence}."
 
-    # the rounds: are the nodes one, and do more rounds help?
+    # would more rounds help, and are the nodes one?
     line = [group for group in groups if group.group.settings[1:] == worst.group.settings[1:]]
     key, first = line[0].group.settings[0]
     last = line[-1].settings[key]
-    fall = 1 - float(line[-1].rmse("dcpf").mean() / line[0].rmse("dcpf").mean())
+    change = float(line[-1].rmse("dcpf").mean() / line[0].rmse("dcpf").mean()) - 1
+    if last != first:
+        helps = "helps" if change <= 1 - allowed else "does not help"
+        # whole per cent: none is neither more nor less
+        yield f"More {helps}: from {key} = {first} to {last}, DCPF's error changes by {round(100 * change)}%."
     summaries = [run["cameras"]["summary"] for run in worst.results]
-    disagreement = float(np.mean([length(each, "disagreement") for each in summaries]))
+    apart = [known for each in summaries if (known := length(each, "disagreement")) is not None]
     excess = float(ours.mean() - theirs.mean())
-    have_agreed = disagreement < ALIKE * excess and fall < allowed - 1
-    apart = f"they differ by {disagreement:.3f} {worst.unit}, and CPF's error is {excess:.3f} less"
-    # whole per cent: none is neither more nor less
-    change = f"; from {key} = {first} to {last}, DCPF's error changes by {round(-100 * fall)}%"
-    yield f"The nodes have {'' if have_agreed else 'not '}agreed: {apart}{change if last != first else ''}."
+    if apart and np.mean(apart) < ALIKE * excess:
+        yield (
+            f"The nodes agree on what is farther off: they differ by {np.mean(apart):.3f} {worst.unit}, and"
+            f" CPF's error is {excess:.3f} {worst.unit} less."
+        )
 
     indefinite = float(np.mean([each["fusion"]["indefinite_local_fraction"] for each in summaries]))
     if indefinite > 0:
