@@ -276,7 +276,8 @@ def _places(size: int) -> Int[np.ndarray, "D D"]:
 
 
 def _to_json(message: PublicMessage | PreviewMessage) -> bytes:
-    fields = _JSON[type(message)].dump_python(message, mode="json")
+    # not mode="json": that writes numbers that are not finite as null
+    fields = _JSON[type(message)].dump_python(message)
     return json.dumps(fields, separators=(",", ":"), allow_nan=False).encode()
 
 

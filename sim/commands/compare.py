@@ -152,10 +152,8 @@ def _print(found: dict[str, Any], verdicts: Sequence[Verdict], folder: Path) -> 
         if not each["settings"]:
             _print_more(console, label, each)
     for verdict in verdicts:
-        holds = "holds" if verdict.holds else "does not hold"
-        console.print(
-            f"{verdict.study}, {verdict.label}, {verdict.claim}: {holds}: {verdict.text}", soft_wrap=True
-        )
+        claim = f"{verdict.study}, {verdict.label}, {verdict.claim}"
+        console.print(f"{claim}: {verdict.in_words}: {verdict.text}", soft_wrap=True)
     console.print(f"figures, plots and report.html in {folder}", soft_wrap=True)
 
 
@@ -185,13 +183,14 @@ def _print_table(console: Console, keys: tuple[str, ...], rows: dict[str, Any]) 
 
 
 def _print_more(console: Console, label: str, each: dict[str, Any]) -> None:
-    lost = each["lost_fraction"]
-    disagreement = _length(length(each, "disagreement"), "median", each["unit"])
-    console.print(
-        f"{label}: target lost in {lost['dcpf']:.0%} of the runs by DCPF, in {lost['cpf']:.0%} by CPF;"
-        f" nodes disagree by {disagreement}",
-        soft_wrap=True,
-    )
+    shares = {name.upper(): share for name, share in each["lost_fraction"].items() if share is not None}
+    lost = ", in ".join(f"{share:.0%} by {name}" for name, share in shares.items())
+    found = [f"target lost in {lost.replace(' by', ' of the runs by', 1)}"] if lost else []
+    if len(each["summaries"][0]["cameras"]) > 1:
+        disagreement = _length(length(each, "disagreement"), "median", each["unit"])
+        found.append(f"nodes disagree by {disagreement}")
+    if found:
+        console.print(f"{label}: {'; '.join(found)}", soft_wrap=True)
     indefinite = each["indefinite_local_fraction"]
     if indefinite and indefinite["max"]:
         share = f"{indefinite['median']:.0%}"

@@ -20,8 +20,6 @@ class FlatClaim(Options):
     """DCPF hardly depends on the swept key, where the single camera does."""
 
     kind: Literal["flat"]
-    otherwise: str = ""
-    """What to write beside the figure, should it not hold: why."""
 
 
 class WithinClaim(Options):
@@ -32,16 +30,12 @@ class WithinClaim(Options):
     """The per cent."""
     from_value: float
     """The value of the study's first key from which it holds."""
-    otherwise: str = ""
-    """What to write beside the figure, should it not hold: why."""
 
 
 class NoisierClaim(Options):
     """DCPF's error varies more between runs with the first value of the second swept key than the last."""
 
     kind: Literal["noisier"]
-    otherwise: str = ""
-    """What to write beside the figure, should it not hold: why."""
 
 
 Claim = Annotated[FlatClaim | WithinClaim | NoisierClaim, Field(discriminator="kind")]
@@ -54,8 +48,8 @@ class StudyOptions(Options):
     """What the figure shows, in a few words."""
     plot: Literal["error", "paths", "frames", "bytes", "time", "strips"] = "error"
     """`error`: RMSE over the first swept key, a line for each value of the others; `paths`: trajectories on
-    the ground; `frames`: the error over time; `bytes`: RMSE over the bytes sent a frame; `time`: RMSE over
-    processor time; `strips`: a point a run."""
+    the ground; `frames`: the error over time; `bytes`: RMSE over the bytes sent a frame, with such lines;
+    `time`: RMSE over processor time; `strips`: a point a run."""
     sweep: Mapping[str, Values] = Field(default={}, max_length=3)
     """Dotted keys of the scenario with their values: `0:0.5:0.1`, `1:20` (the last included), `a,b,c`, or a
     list. A number as the value of `cameras` takes the first so many."""

@@ -50,9 +50,8 @@ def plot_study(findings: Findings, name: str) -> Figure:
         ]
         for preset in presets
     ]
-    return _grid(
-        [(findings.options.studies[name].plot, row) for row in rows], findings.options.studies[name].title
-    )
+    options = findings.options.studies[name]
+    return _grid([(options.plot, row) for row in rows], _titled(findings, options.title or name))
 
 
 def plot_page(findings: Findings, preset: str) -> Figure:
@@ -68,7 +67,7 @@ def plot_page(findings: Findings, preset: str) -> Figure:
         )
         for name in findings.options.page
     ]
-    return _grid(rows, f"{findings.options.name}, {preset} preset")
+    return _grid(rows, _titled(findings, f"{findings.options.name}, {preset} preset"))
 
 
 def _grid(rows: Sequence[tuple[str, Sequence[tuple[str, list[GroupFindings]]]]], title: str) -> Figure:
@@ -84,9 +83,14 @@ def _grid(rows: Sequence[tuple[str, Sequence[tuple[str, list[GroupFindings]]]]],
             axes.remove()
         last = places[len(panels) - 1]
         last.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), frameon=False, fontsize=8, borderaxespad=0)
-    if title:
-        figure.suptitle(title, size=11)
+    figure.suptitle(title, size=11)
     return figure
+
+
+def _titled(findings: Findings, title: str) -> str:
+    """A title that says how many runs stand behind the figure."""
+    runs = findings.options.runs
+    return f"{title}, {runs} {'run' if runs == 1 else 'runs'} of each setting"
 
 
 def _strips(findings: Findings, name: str) -> Figure:

@@ -4,7 +4,7 @@ Imports matplotlib: what only runs scenarios does not import this module.
 """
 
 from collections.abc import Sequence
-from itertools import product
+from itertools import cycle
 
 import numpy as np
 from jaxtyping import Float
@@ -14,17 +14,9 @@ from matplotlib.ticker import MaxNLocator
 from sim.experiments.found.findings import GroupFindings, Track
 from sim.metrics.intervals import Interval, mean_interval
 from sim.pictures.plots import log_axis
-from sim.pictures.theme import COLORS, LABELS, MUTED, PAPER
+from sim.pictures.swept import AXES, from_to, lines_of, places_of, tick_labels
+from sim.pictures.theme import COLORS, LABELS, PAPER
 
-AXES = {
-    "filter.model_update.alpha": "model update α (Eq. 4)",
-    "network.iterations": "rounds of consensus t",
-    "filter.n_particles": "particles n",
-    "network.graph": "communication graph",
-    "cameras": "cameras",
-}
-"""What axes call the keys that are swept most; others go by their own name."""
-_SHORT = {"filter.n_particles": "n", "network.iterations": "t", "filter.model_update.alpha": "α"}
 _NAMES: dict[Track, str] = {
     "dcpf": LABELS["dcpf"],
     "cpf": LABELS["cpf"],
@@ -38,36 +30,36 @@ _TINTS: dict[Track, str] = {
     "coded": "#56B4E9",
 }
 _MOST_TICKS = 9
+_LEAST_RANGE = 2.5  # of a logarithmic axis, top over bottom: less makes mountains of noise
 _DASHES = ("-", "--", ":", "-.")
 
 
 def draw_error(axes: Axes, groups: Sequence[GroupFindings]) -> None:
-    """Mean RMSE over the first swept key in a band of 95% confidence, a dash for each value of the others."""
-    key, *others = (name for name, _ in groups[0].group.settings)
+    """Mean RMSE over the first swept key in a band of 95% confidence, a dash for each value of the others.
+
+    Where the key's values are words, nothing lies between them: points with bars, and no lines.
+    """
+    key, *_ = (name for name, _ in groups[0].group.settings)
     values = list(dict.fromkeys(group.settings[key] for group in groups))
-    numbers, is_number = _numbers(values)
-    combinations = list(
-        product(*(dict.fromkeys(group.settings[name] for group in groups) for name in others))
-    )
-    for dash, combination in zip(_DASHES * len(combinations), combinations, strict=False):
-        line = [g for g in groups if tuple(g.settings[name] for name in others) == combination]
-        if not line:  # an interrupted experiment has not come to it
-            continue
-        x = numbers[[values.index(group.settings[key]) for group in line]]
-        label = "".join(
-            f", {_short(name)} = {value}" for name, value in zip(others, combination, strict=True)
-        )
-        _draw_cameras(axes, x, line)
-        for track in ("single", "cpf", "dcpf"):
-            if line[0].has(track):
-                intervals = [mean_interval(group.rmse(track)) for group in line]
-                _draw_line(axes, x, intervals, _TINTS[track], _NAMES[track] + label, dash)
+    places, is_number = places_of(values)
+    tracks: tuple[Track, ...] = ("single", "cpf", "dcpf")
+    for place, track in enumerate(tracks):
+        for dash, (label, line) in zip(cycle(_DASHES), lines_of(groups, track).items(), strict=False):
+            x = places[[values.index(group.settings[key]) for group in line]]
+            intervals = [mean_interval(group.rmse(track)) for group in line]
+            name = _NAMES[track] + label
+            if track == "single":
+                _draw_cameras(axes, x, line)
+            if is_number:
+                _draw_line(axes, x, intervals, _TINTS[track], name, dash)
+            else:
+                _draw_points(axes, x + 0.08 * (place - 1), intervals, _TINTS[track], "o", name)
     if not is_number or len(values) <= _MOST_TICKS:
-        axes.set_xticks(numbers, values)
+        axes.set_xticks(places, tick_labels(places, values))
     if not is_number:
         axes.set_xlim(-0.5, len(values) - 0.5)
     axes.set(xlabel=AXES.get(key, key), ylabel=_rmse_label(groups))
-    log_axis(axes)
+    _log_error_axis(axes)
 
 
 def draw_paths(axes: Axes, groups: Sequence[GroupFindings]) -> None:
@@ -109,22 +101,27 @@ def draw_frames(axes: Axes, groups: Sequence[GroupFindings]) -> None:
 
 
 def draw_bytes(axes: Axes, groups: Sequence[GroupFindings]) -> None:
-    """Mean RMSE over the bytes that all cameras send in a frame: DCPF's settings, CPF's codings."""
-    sent = [group.bytes_per_frame() for group in groups]
-    ours = [mean_interval(group.rmse("dcpf")) for group in groups]
-    x = np.array([each["dcpf"] for each in sent])
-    _draw_points(axes, x, ours, _TINTS["dcpf"], "-o", _NAMES["dcpf"])
-    _annotate(axes, groups, x, ours)
+    """Mean RMSE over the bytes that all cameras send in a frame: DCPF's settings, CPF's codings.
+
+    DCPF has a line over the first swept key, with a dash for each value of the others.
+    """
+    for index, (label, line) in enumerate(lines_of(groups, "dcpf").items()):
+        ours = [mean_interval(group.rmse("dcpf")) for group in line]
+        x = np.array([group.bytes_per_frame()["dcpf"] for group in line])
+        style = f"{_DASHES[index % len(_DASHES)]}o"
+        name = _NAMES["dcpf"] + label + from_to(line)
+        _draw_points(axes, x, ours, _TINTS["dcpf"], style, name, hollow=index > 0)
+    sent = groups[0].bytes_per_frame()
     raw = mean_interval(groups[0].rmse("cpf"))
     points = [("cpf", raw, "o", "CPF, raw pictures"), ("bins", raw, "s", "CPF, bin indices as PNG")]
     if groups[0].has("coded"):
         points.append(("jpeg", mean_interval(groups[0].rmse("coded")), "^", "CPF, JPEG"))
     for name, interval, marker, label in points:
-        if name in sent[0]:
+        if name in sent:
             color = _TINTS["coded" if name == "jpeg" else "cpf"]
-            _draw_points(axes, np.array([sent[0][name]]), [interval], color, marker, label)
+            _draw_points(axes, np.array([sent[name]]), [interval], color, marker, label)
     axes.set(xlabel="bytes a frame, all cameras", ylabel=_rmse_label(groups), xscale="log")
-    log_axis(axes)
+    _log_error_axis(axes)
 
 
 def draw_time(axes: Axes, groups: Sequence[GroupFindings]) -> None:
@@ -138,7 +135,7 @@ def draw_time(axes: Axes, groups: Sequence[GroupFindings]) -> None:
         )
         _draw_cost(axes, groups, "dcpf", spent, "each camera")
     axes.set(xlabel="processor time a frame / ms", ylabel=_rmse_label(groups))
-    log_axis(axes)
+    _log_error_axis(axes)
     axes.set_xlim(left=0)
 
 
@@ -146,14 +143,12 @@ def _draw_cost(
     axes: Axes, groups: Sequence[GroupFindings], track: Track, spent: Float[np.ndarray, " S"], where: str
 ) -> None:
     intervals = [mean_interval(group.rmse(track)) for group in groups]
-    _draw_points(axes, spent, intervals, _TINTS[track], "-o", f"{_NAMES[track]}, {where}")
-    _annotate(axes, groups, spent, intervals)
+    name = f"{_NAMES[track]}, {where}{from_to(groups)}"
+    _draw_points(axes, spent, intervals, _TINTS[track], "-o", name)
 
 
 def _draw_cameras(axes: Axes, x: Float[np.ndarray, " S"], groups: Sequence[GroupFindings]) -> None:
     """The mean RMSE of each single camera, thin; not where their number is what is swept."""
-    if not groups[0].has("single"):
-        return
     each = [group.node_rmse("single").mean(axis=0) for group in groups]
     if len({len(cameras) for cameras in each}) == 1:
         lines = axes.plot(x, np.array(each), color=_TINTS["single"], linewidth=0.7, alpha=0.6)
@@ -165,49 +160,46 @@ def _draw_line(
     axes: Axes, x: Float[np.ndarray, " S"], intervals: Sequence[Interval], color: str, label: str, dash: str
 ) -> None:
     value, low, high = np.array([[each.value, each.low, each.high] for each in intervals]).T
-    axes.plot(x, value, dash, marker="o", markersize=4, color=color, linewidth=1.6, label=label)
+    fill = color if dash == "-" else PAPER
+    axes.plot(
+        x,
+        value,
+        dash,
+        marker="o",
+        markersize=4,
+        color=color,
+        markerfacecolor=fill,
+        linewidth=1.6,
+        label=label,
+    )
     axes.fill_between(x, low, high, color=color, alpha=0.15, linewidth=0)
 
 
 def _draw_points(
-    axes: Axes, x: Float[np.ndarray, " S"], intervals: Sequence[Interval], color: str, style: str, label: str
+    axes: Axes,
+    x: Float[np.ndarray, " S"],
+    intervals: Sequence[Interval],
+    color: str,
+    style: str,
+    label: str,
+    *,
+    hollow: bool = False,
 ) -> None:
     """Points with bars of 95% confidence."""
     value, low, high = np.array([[each.value, each.low, each.high] for each in intervals]).T
     axes.errorbar(
         x, value, yerr=[value - low, high - value], fmt=style, color=color, markersize=5, linewidth=1.6,
-        elinewidth=0.8, capsize=2, label=label,
+        markerfacecolor=PAPER if hollow else color, elinewidth=0.8, capsize=2, label=label,
     )  # fmt: skip
 
 
-def _annotate(
-    axes: Axes, groups: Sequence[GroupFindings], x: Float[np.ndarray, " S"], intervals: Sequence[Interval]
-) -> None:
-    """The value of the swept key below the first point's bar, and above the last one's."""
-    for index, end, offset, align in (
-        (0, intervals[0].low, -4, "top"),
-        (-1, intervals[-1].high, 4, "bottom"),
-    ):
-        name, value = groups[index].group.settings[0]
-        axes.annotate(
-            f"{_short(name)} = {value}", (x[index], end), xytext=(0, offset), textcoords="offset points",
-            ha="center", va=align, color=MUTED, size=8, zorder=5,
-            bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5, "alpha": 0.85},
-        )  # fmt: skip
-    axes.margins(x=0.12, y=0.12)
+def _log_error_axis(axes: Axes) -> None:
+    """A logarithmic axis of errors, wide enough that what is alike looks alike."""
+    log_axis(axes)
+    bottom, top = axes.get_ylim()
+    widen = np.sqrt(max(1.0, _LEAST_RANGE / (top / bottom)))
+    axes.set_ylim(bottom / widen, top * widen)
 
 
 def _rmse_label(groups: Sequence[GroupFindings]) -> str:
     return f"RMSE of the position / {groups[0].unit}"
-
-
-def _numbers(values: Sequence[str]) -> tuple[Float[np.ndarray, " S"], bool]:
-    """The values as numbers, or their places where they are words."""
-    try:
-        return np.array([float(value) for value in values]), True
-    except ValueError:
-        return np.arange(len(values), dtype=float), False
-
-
-def _short(key: str) -> str:
-    return _SHORT.get(key, key.rpartition(".")[2].replace("_", " "))

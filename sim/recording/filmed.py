@@ -11,7 +11,7 @@ from jaxtyping import UInt8
 
 from network import codec, keys
 from network.errors import RefusedMessage
-from network.messages import EstimateMessage, TruthMessage
+from network.messages import EstimateMessage, StatusMessage, TruthMessage
 from nodes.sources import FrameSource, SourceError
 from sim.assembly import Assembly
 from sim.recording.reader import McapRecording
@@ -21,8 +21,8 @@ from sim.running.results import Results
 def results_of(recording: McapRecording) -> Results:
     """What a run has found, as its recording tells."""
     results = Results(recording.scenario)
-    kinds: dict[str, type[EstimateMessage | TruthMessage]] = {
-        kind.kind: kind for kind in (EstimateMessage, TruthMessage)
+    kinds: dict[str, type[EstimateMessage | TruthMessage | StatusMessage]] = {
+        kind.kind: kind for kind in (EstimateMessage, TruthMessage, StatusMessage)
     }
     for frame in range(recording.frames):
         for key, data in recording.at(frame, pictures=False):

@@ -118,8 +118,27 @@ class StudyReport:
 
     title: str
     plot: Plot
-    claims: Sequence[tuple[bool, str]]
+    claims: Sequence[tuple[str, str]]
     figures: Sequence[Table]
+
+
+@dataclass(frozen=True, slots=True)
+class ShownRun:
+    """One run of an experiment, with its pictures.
+
+    Attributes:
+        title: Scenario, preset and seed.
+        settings: What is swept in the experiment, and its values here.
+        moments: Pictures of the cameras.
+        shown: What is drawn in them: `dcpf`, `cpf`, `truth`.
+        links: Bytes and messages of each link.
+    """
+
+    title: str
+    settings: str
+    moments: Sequence[Moment]
+    shown: Sequence[str]
+    links: Table | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +152,7 @@ class ExperimentReport:
         notes: What the reader must know first, such as runs that are missing.
         worlds: Where it takes place.
         studies: What was found.
+        runs: One run of each scenario that some study has as it is; else of each.
     """
 
     name: str
@@ -141,3 +161,4 @@ class ExperimentReport:
     notes: Sequence[str]
     worlds: Sequence[Plot]
     studies: Sequence[StudyReport]
+    runs: Sequence[ShownRun]

@@ -15,10 +15,19 @@ from sim.metrics.consistency import anees_band
 from sim.pictures.experiment import plot_study
 from sim.report.elements import ExperimentReport, Plot, StudyReport, Table
 from sim.report.figures import plot_world
+from sim.report.one_run import plainest, shown_runs
 from sim.report.svg import inline
 from sim.running.provenance import versions
 from sim.running.results import Results
 
+_CAPTIONS: Mapping[str, str] = {
+    "error": "mean over the runs, in bands or bars of 95% confidence",
+    "paths": "thin, each run, its deviation from its own truth laid on the mean true path; thick, their mean",
+    "frames": "median over runs and nodes, in a band from 10 to 90% of them",
+    "bytes": "mean over the runs, in bars of 95% confidence",
+    "time": "mean over the runs, in bars of 95% confidence; processor time in the median",
+    "strips": "a point a run, the median as a bar",
+}
 _ESTIMATORS = {"dcpf": "DCPF", "cpf": "CPF", "best single": "best single camera", "cpf jpeg": "CPF, JPEG"}
 
 
@@ -30,13 +39,18 @@ def experiment_report(findings: Findings, verdicts: Sequence[Verdict]) -> Experi
         verdicts: Its claims, held against that.
     """
     names = list(dict.fromkeys(each.group.study for each in findings.groups))
+    plain = plainest(findings)
     return ExperimentReport(
         name=findings.options.name,
         facts=_facts(findings),
         versions=versions(),
         notes=_notes(findings),
-        worlds=[*_worlds(findings)],
+        worlds=[*_worlds(plain)],
         studies=[_study(findings, name, [each for each in verdicts if each.study == name]) for name in names],
+        # As the scenarios are, if some study has them so; whoever has interrupted it wants to be gone.
+        runs=[]
+        if any(findings.missing.values())
+        else shown_runs([each for each in plain if not each.settings] or plain),
     )
 
 
@@ -64,13 +78,13 @@ def _notes(findings: Findings) -> list[str]:
     return [f"The experiment was interrupted, or runs failed: {lacking}. {shown}"]
 
 
-def _worlds(findings: Findings) -> Iterator[Plot]:
+def _worlds(groups: Sequence[GroupFindings]) -> Iterator[Plot]:
     """The ground of each scenario, once for all its settings; none where it is a camera's picture."""
     number = count(1)
-    for name in dict.fromkeys(each.group.scenario for each in findings.groups):
-        group = next(each.group for each in reversed(findings.groups) if each.group.scenario == name)
+    for group in (each.group for each in groups):
         if group.scenario_run.target.space == "image":
             continue
+        name = group.scenario
         drawing = inline(
             plot_world(Results(group.scenario_run), Assembly(group.scenario_run)),
             f"world-{next(number)}",
@@ -80,18 +94,22 @@ def _worlds(findings: Findings) -> Iterator[Plot]:
 
 
 def _study(findings: Findings, name: str, verdicts: Sequence[Verdict]) -> StudyReport:
-    title = findings.options.studies[name].title or name
+    options = findings.options.studies[name]
+    title = options.title or name
     figure = plot_study(findings, name)
     figure.suptitle("")  # the heading has said it
     drawing = inline(figure, f"study-{name}", f"Figure of the study {title}")
     return StudyReport(
         title=title,
-        plot=Plot(
-            drawing, f"{name}: bands and bars are 95% confidence or the spread of the runs.", wide=True
-        ),
-        claims=[(each.holds, f"{each.label}, {each.claim}: {each.text}") for each in verdicts],
+        plot=Plot(drawing, f"{_runs(findings)} of each setting: {_CAPTIONS[options.plot]}.", wide=True),
+        claims=[(each.in_words, f"{each.label}, {each.claim}: {each.text}") for each in verdicts],
         figures=[_table(label, findings.study(name, label)) for label in findings.labels(name)],
     )
+
+
+def _runs(findings: Findings) -> str:
+    runs = findings.options.runs
+    return f"{runs} runs" if runs > 1 else "One run"
 
 
 def _table(label: str, groups: Sequence[GroupFindings]) -> Table:

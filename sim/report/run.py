@@ -16,7 +16,7 @@ from sim.report.elements import Plot, RunReport
 from sim.report.figures import WIDTH_IN, plot_disagreement, plot_heights, plot_paths, plot_world
 from sim.report.retelling import filmed, told_again
 from sim.report.run_tables import figures_table, links_table, timing_table
-from sim.report.stills import choose_moments, moments_of
+from sim.report.stills import choose_moments, drawn_in, moments_of
 from sim.report.svg import inline
 from sim.running.convergence import converge
 from sim.running.results import Results
@@ -59,10 +59,7 @@ def run_report(
         errors=_errors(results),
         places=_places(results, assembly),
         moments=moments_of(results, assembly, previews, why),
-        shown=[
-            *(kind for kind in ("dcpf", "cpf") if results.of(kind)),
-            *(["truth"] if results.truth else []),
-        ],
+        shown=drawn_in(results),
         network=_network(results, assembly),
         links=links_table(results, assembly, summary),
         timing=timing_table(summary),

@@ -28,7 +28,8 @@ from sim.world.colors import bgr
 WIDTH_PX = 480
 """Of a picture, at most; less if there are so many that the page would become heavy."""
 LIMIT_BYTES = 1_500_000
-"""All pictures of a page together, at most, unless there are hundreds."""
+"""All pictures of a run's page together."""
+_FUSED: tuple[Shown, ...] = ("dcpf", "cpf")
 _MIN_WIDTH_PX = 120
 _QUALITY = 75
 _INSET = 0.3  # side of a close-up against the picture's width
@@ -40,11 +41,13 @@ _LEAST_PX = 4  # of the camera's picture in a close-up
 
 def choose_moments(results: Results) -> dict[int, str]:
     """Frames to show, with the reason: the first estimates, the middle, the end, and where DCPF is worst."""
-    last = results.frames_done - 1
+    errors = [e for track in results.of("dcpf").values() if (e := results.errors(track)) is not None]
+    return moments_by(results.frames_done - 1, np.array(errors))
+
+
+def moments_by(last: int, errors: Float[np.ndarray, "..."]) -> dict[int, str]:
+    """The same by the last frame and the errors of all nodes from frame 1 on; there may be none."""
     moments = {min(1, last): "the first step", last // 2: "the middle of the run", last: "the last frame"}
-    errors = np.array(
-        [e for track in results.of("dcpf").values() if (e := results.errors(track)) is not None]
-    )
     if np.isfinite(errors).any():
         worst = 1 + int(np.nan_to_num(errors, nan=-1.0).max(axis=0).argmax())
         moments.setdefault(worst, "DCPF is farthest from the truth")
@@ -52,7 +55,11 @@ def choose_moments(results: Results) -> dict[int, str]:
 
 
 def moments_of(
-    results: Results, assembly: Assembly, previews: Previews, why: Mapping[int, str]
+    results: Results,
+    assembly: Assembly,
+    previews: Previews,
+    why: Mapping[int, str],
+    limit_bytes: int = LIMIT_BYTES,
 ) -> list[Moment]:
     """The pictures of all cameras at some frames.
 
@@ -61,6 +68,7 @@ def moments_of(
         assembly: Its scenario, put together.
         previews: What the cameras saw.
         why: The frames, and the reason to show each.
+        limit_bytes: All pictures together, at most, unless there are hundreds.
 
     Returns:
         Pictures as WebP, of one width for all, the widest that fits the limit.
@@ -72,9 +80,15 @@ def moments_of(
             for frame, reason in why.items()
         ]
         total = sum(len(still.source) for moment in moments for still in moment.stills)
-        if total <= LIMIT_BYTES or width <= _MIN_WIDTH_PX:
+        if total <= limit_bytes or width <= _MIN_WIDTH_PX:
             return moments
-        width = max(_MIN_WIDTH_PX, int(0.9 * width * np.sqrt(LIMIT_BYTES / total)))
+        width = max(_MIN_WIDTH_PX, int(0.9 * width * np.sqrt(limit_bytes / total)))
+
+
+def drawn_in(results: Results) -> list[Shown]:
+    """What the pictures of a run have drawn in them."""
+    found: list[Shown] = [kind for kind in _FUSED if results.of(kind)]
+    return [*found, "truth"] if results.truth else found
 
 
 @dataclass(frozen=True, slots=True, eq=False)

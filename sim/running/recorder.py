@@ -83,7 +83,7 @@ class Recorder:
             (folder / "logs").mkdir(parents=True, exist_ok=True)
             for earlier in ("summary.json", FILM):
                 (folder / earlier).unlink(missing_ok=True)
-            dump(_plain(scenario), folder / "scenario.yaml")
+            dump(as_run(scenario), folder / "scenario.yaml")
             for name in ("estimates", "truth", "events"):
                 self._files[name] = (folder / f"{name}.jsonl").open("w", encoding="utf-8")
             if film is not None:
@@ -189,7 +189,7 @@ class Recorder:
             raise _cannot_write(self.folder, error) from error
 
 
-def _plain(scenario: Scenario) -> dict[str, Any]:
+def as_run(scenario: Scenario) -> dict[str, Any]:
     """A scenario as plain data; null has a meaning everywhere but in the ways that a camera is not given."""
     data = scenario.model_dump(mode="json")
     cameras = [

@@ -123,13 +123,18 @@ def dump(content: BaseModel | Mapping[str, Any], path: Path) -> None:
         content: A model, or plain data; keys keep their order.
         path: The file, replaced if it exists.
     """
+    path.write_text(as_yaml(content), encoding="utf-8")
+
+
+def as_yaml(content: BaseModel | Mapping[str, Any]) -> str:
+    """The text of the same."""
     plain = content.model_dump(mode="json") if isinstance(content, BaseModel) else dict(content)
     yaml = YAML()
     yaml.width = 110
     yaml.indent(mapping=2, sequence=4, offset=2)
     text = StringIO()
     yaml.dump(_laid_out(plain), text)
-    path.write_text(text.getvalue(), encoding="utf-8")
+    return text.getvalue()
 
 
 def _laid_out(value: Any) -> Any:

@@ -19,6 +19,7 @@ from network.messages import (
     ControlMessage,
     EstimateMessage,
     PixelsMessage,
+    PreviewMessage,
     StatusMessage,
     TruthMessage,
     Visibility,
@@ -256,6 +257,19 @@ def test_values_that_are_not_finite_are_our_own_mistake():
         codec.encode(RUN, ConsensusMessage("C1", 7, 3, 2, np.array([np.nan])))
     with pytest.raises(ValueError, match="not JSON compliant"):
         codec.encode(RUN, ControlMessage("start", float("inf")))
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        dataclasses.replace(ESTIMATE, mean=np.full(4, np.nan)),
+        dataclasses.replace(TRUTH, mean=np.array([0.1, -np.inf, 0.0, 1.5])),
+        PreviewMessage(RUN, "C1", 7, 0.7, np.array([[np.nan, 0.0]]), b""),
+    ],
+)
+def test_no_array_that_is_not_finite_gets_into_json(message):
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        codec.encode(RUN, message)
 
 
 @settings(deadline=None)

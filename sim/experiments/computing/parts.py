@@ -57,8 +57,8 @@ def cameras_part(scenario: Scenario, *, with_single: bool) -> Part:
 def central_part(scenario: Scenario, jpeg_quality: int | None = None) -> Part:
     """The central node of a run, on raw pictures or on pictures that were sent as JPEG."""
     default = type(scenario.network).model_fields
-    # Neither who talks to whom nor how they fuse concerns it.
-    unused = {key: default[key].get_default() for key in ("graph", "iterations", "payload")}
+    # Neither who talks to whom, over what links, nor how they fuse concerns it.
+    unused = {key: default[key].get_default() for key in ("graph", "iterations", "payload", "conditions")}
     network = scenario.network.model_copy(update={**unused, "consensus": MetropolisWeights()})
     scenario = scenario.model_copy(
         update={"network": network, "fusion": type(scenario).model_fields["fusion"].get_default()}

@@ -46,9 +46,7 @@ def compare(runs: Sequence[Mapping[str, Any]], n_axes: int) -> dict[str, Any]:
         **in_unit(lengths, unit),
         "ratio_dcpf_cpf": _spread(ratios),
         "ratio_dcpf_best_single": _spread(of_best),
-        "lost_fraction": {
-            name: sum(bool(run["lost"][name]) for run in runs) / len(runs) for name in ("dcpf", "cpf")
-        },
+        "lost_fraction": {name: _share([run["lost"][name] for run in runs]) for name in ("dcpf", "cpf")},
         "anees": {name: _spread([run["anees"][name] for run in runs]) for name in ("dcpf", "cpf")},
         "anees_band95": anees_band(len(runs), n_axes),
         "tracking": {name: _tracking([run["tracking"][name] for run in runs]) for name in ("dcpf", "cpf")},
@@ -64,6 +62,11 @@ def _best_single(run: Mapping[str, Any]) -> float | None:
 def _spread(values: Sequence[float | None]) -> dict[str, float] | None:
     known = [value for value in values if value is not None]
     return {"median": median(known), "min": min(known), "max": max(known)} if known else None
+
+
+def _share(facts: Sequence[bool | None]) -> float | None:
+    known = [fact for fact in facts if fact is not None]
+    return sum(known) / len(known) if known else None
 
 
 def _mean(values: Sequence[float | None]) -> dict[str, float] | None:

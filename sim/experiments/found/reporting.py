@@ -73,8 +73,7 @@ def claims_text(findings: Findings, verdicts: Sequence[Verdict]) -> str:
     for name in dict.fromkeys(verdict.study for verdict in verdicts):
         lines += [f"## {name}: {findings.options.studies[name].title}".rstrip(": "), ""]
         for verdict in (each for each in verdicts if each.study == name):
-            holds = "holds" if verdict.holds else "does not hold"
-            lines.append(f"- **{verdict.label}, {verdict.claim}: {holds}.** {verdict.text}")
+            lines.append(f"- **{verdict.label}, {verdict.claim}: {verdict.in_words}.** {verdict.text}")
         lines.append("")
     return "\n".join(lines)
 

@@ -1,11 +1,17 @@
-"""For the tests of experiments: the command in an empty folder with the small scenario."""
+"""For the tests of experiments: the command in an empty folder with the small scenario, made-up findings."""
 
 import json
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from sim.commands.app import app
+from sim.experiments.found.findings import Findings, GroupFindings
+from sim.experiments.options import ExperimentOptions
+from sim.experiments.plan import make_plan
+
+N_FRAMES = 10
 
 BRIEF = ["--frames", "3", "--set", "filter.n_particles=10"]
 EXPERIMENT = {
@@ -18,7 +24,7 @@ EXPERIMENT = {
             "sweep": {"network.iterations": "1:3", "filter.n_particles": [10, 20]},
             "claims": [
                 {"kind": "flat"},
-                {"kind": "within", "percent": 5.0, "from_value": 2, "otherwise": "few particles"},
+                {"kind": "within", "percent": 5.0, "from_value": 2},
                 {"kind": "noisier"},
             ],
         },
@@ -55,3 +61,37 @@ def tiny(small):
     path = small.parent / "tiny.yaml"
     path.write_text(json.dumps(EXPERIMENT), encoding="utf-8")
     return path
+
+
+def track(error):
+    """A track that is so far from the origin, always or frame by frame."""
+    away = np.broadcast_to(error, N_FRAMES)
+    return {"positions": [[float(x), 0.0] for x in away], "nees": [1.0] * N_FRAMES}
+
+
+def found(small, claim, errors, *, runs=3, disagreement=0.0, indefinite=0.0):
+    """Findings of one study over t and n.
+
+    `errors(t, n, seed)` gives those of DCPF, CPF and two single cameras, always or frame by frame.
+    """
+    study = {
+        "sweep": {"network.iterations": ["1", "12"], "filter.n_particles": ["300", "500"]},
+        "claims": [claim],
+    }
+    options = ExperimentOptions.model_validate(
+        {"name": "e", "runs": runs, "scenarios": [str(small)], "studies": {"a": study}}
+    )
+    plan = make_plan(options, small.parent, [], lambda *_: "here")
+    truth = [[0.0, 0.0]] * N_FRAMES
+    summary = {"disagreement_m": disagreement, "fusion": {"indefinite_local_fraction": indefinite}}
+    groups = []
+    for group in plan.groups:
+        t, n = (float(value) for _, value in group.settings)
+        results = []
+        for seed in group.seeds:
+            dcpf, cpf, first, second = errors(t, n, seed)
+            tracks = {"dcpf/A": track(dcpf), "single/A": track(first), "single/B": track(second)}
+            cameras = {"tracks": tracks, "truth": truth, "summary": summary}
+            results.append({"cameras": cameras, "central": {"tracks": {"cpf/c": track(cpf)}, "truth": truth}})
+        groups.append(GroupFindings(group, results))
+    return Findings(options, tuple(groups), dict.fromkeys(options.studies, 0))

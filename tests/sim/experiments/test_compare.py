@@ -193,3 +193,19 @@ def test_workers_with_another_program_are_refused(compare, small, monkeypatch):
 
     assert result.exit_code == 2
     assert "the workers run another version of dcpf" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("baselines", "sentence"),
+    [
+        ("true", "target lost in 0% of the runs by DCPF, in 0% by CPF; nodes disagree"),
+        ("false", "target lost in 0% of the runs by DCPF; nodes disagree"),
+    ],
+)
+def test_nothing_is_said_of_a_filter_that_did_not_run(compare, small, baselines, sentence):
+    given = [*BRIEF, "--set", f"baselines.cpf={baselines}", "--runs", 1, "--jobs", 1, "--out", "out"]
+
+    result = compare(small, *given)
+
+    assert result.exit_code == 0
+    assert sentence in result.stdout

@@ -46,8 +46,12 @@ def test_figures_are_medians_with_the_best_and_the_worst():
 
 
 def test_without_baselines_or_truth_there_is_nothing_to_compare():
-    figures = compare([summary(0.1, None, {})], 2)
+    run = summary(0.1, None, {})
+    run["lost"]["cpf"] = None  # as where no CPF ran
 
+    figures = compare([run], 2)
+
+    assert figures["lost_fraction"] == {"dcpf": 0, "cpf": None}
     assert figures["rmse_m"]["cpf"] is None
     assert figures["rmse_m"]["best_single"] is None
     assert figures["ratio_dcpf_cpf"] is None

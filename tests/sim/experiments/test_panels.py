@@ -11,6 +11,7 @@ from sim.experiments.found.findings import Findings, GroupFindings
 from sim.experiments.options import ExperimentOptions
 from sim.experiments.plan import make_plan
 from sim.pictures.experiment import PANELS, plot_page, plot_study
+from sim.pictures.swept import lines_of, places_of, tick_labels
 from sim.pictures.theme import COLORS
 
 N_FRAMES = 5
@@ -30,6 +31,13 @@ def findings(small):
         "error": {"sweep": grid},
         "graph": {"sweep": {"network.graph": ["ring", "path"]}},
         "bytes": {"plot": "bytes", "sweep": {"network.iterations": ["1", "12"]}, "jpeg_quality": 90},
+        "rules": {
+            "plot": "bytes",
+            "sweep": {
+                "network.iterations": ["1", "12"],
+                "network.consensus.algorithm": ["metropolis", "event_triggered"],
+            },
+        },
         "time": {"plot": "time", "sweep": {"filter.n_particles": ["300", "500"]}},
         "paths": {"plot": "paths"},
         "frames": {"plot": "frames"},
@@ -45,13 +53,14 @@ def findings(small):
 def results(group):
     settings = dict(group.settings)
     t, n = (float(settings.get(key, 10)) for key in ("network.iterations", "filter.n_particles"))
+    is_other = settings.get("network.consensus.algorithm") == "event_triggered"
     network = {
         "network": {key: {"dcpf": 512 * t, "cpf": 1e6} for key in ("bytes_per_frame", "bytes_at_start")},
         "timing": {},
         "unit": "m",
     }
     for seed in group.seeds:
-        error = 0.1 / t + 10 / n + 0.01 * seed
+        error = 0.1 / t + 10 / n + 0.01 * seed + 0.02 * is_other
         cameras = {
             "tracks": {
                 **{f"dcpf/{name}": track(error) for name in "ABCD"},
@@ -114,6 +123,29 @@ def test_of_an_interrupted_study_the_lines_are_as_long_as_there_are_settings(fin
     np.testing.assert_allclose(drawn["DCPF, n = 500"].get_xdata(), [1])
 
 
+def test_what_the_other_keys_do_not_concern_is_drawn_once(findings):
+    """CPF on other graphs is CPF."""
+    groups = [
+        replace(
+            each,
+            results=[
+                {**run, "central": first["central"]}
+                for run, first in zip(each.results, same.results, strict=True)
+            ],
+        )
+        for each in findings.study("error")
+        for same in findings.study("error")
+        if same.settings == {**each.settings, "filter.n_particles": "300"}
+    ]
+
+    axes = Figure().add_subplot()
+    PANELS["error"](axes, groups)
+
+    drawn = lines(axes)
+    assert {name for name in drawn if "CPF" in name} == {"CPF", "DCPF, n = 300", "DCPF, n = 500"}
+    np.testing.assert_allclose(drawn["CPF"].get_xdata(), [1, 12])
+
+
 def test_words_stand_at_their_place_on_the_axis(findings):
     axes = panel(findings, "graph")
 
@@ -124,19 +156,44 @@ def test_words_stand_at_their_place_on_the_axis(findings):
 def test_bytes_are_those_that_were_sent(findings):
     axes = panel(findings, "bytes")
 
-    np.testing.assert_allclose(points(axes)["DCPF"], [512, 6144])
-    assert {name: x.tolist() for name, x in points(axes).items() if name != "DCPF"} == {
+    np.testing.assert_allclose(points(axes)["DCPF\nt = 1 to 12"], [512, 6144])
+    assert {name: x.tolist() for name, x in points(axes).items() if "DCPF" not in name} == {
         "CPF, raw pictures": [1e6],
         "CPF, JPEG": [1e5],
         "CPF, bin indices as PNG": [2e5],
     }
 
 
+def test_bytes_have_a_line_for_each_value_of_the_second_key(findings):
+    axes = panel(findings, "rules")
+
+    # words speak for themselves
+    assert {name for name in points(axes) if "DCPF" in name} == {
+        "DCPF, metropolis\nt = 1 to 12",
+        "DCPF, event triggered\nt = 1 to 12",
+    }
+
+
+def test_ticks_that_would_run_into_each_other_have_no_label():
+    places, is_number = places_of(["1", "2", "4", "20"])
+
+    assert is_number
+    assert tick_labels(places, ["1", "2", "4", "20"]) == ["1", "", "4", "20"]
+
+
+def test_yes_and_no_are_named(findings):
+    key = ("filter.model_update.gated", "true")
+    (group, *_) = findings.study("rules")
+    named = replace(group, group=replace(group.group, settings=(*group.group.settings, key)))
+
+    assert list(lines_of([named], "dcpf")) == [", metropolis, gated = true"]
+
+
 def test_time_is_a_cameras_and_the_central_nodes(findings):
     drawn = points(panel(findings, "time"))
 
-    np.testing.assert_allclose(drawn["DCPF, each camera"], [300, 500])
-    np.testing.assert_allclose(drawn["CPF, central node"], [300, 500])
+    np.testing.assert_allclose(drawn["DCPF, each camera\nn = 300 to 500"], [300, 500])
+    np.testing.assert_allclose(drawn["CPF, central node\nn = 300 to 500"], [300, 500])
 
 
 def test_paths_are_truth_and_mean_deviation(findings):
@@ -163,7 +220,7 @@ def test_a_page_has_a_row_a_study_and_its_figures_a_title(findings):
     assert len(plot_study(findings, "error").axes) == 1
 
 
-@pytest.mark.parametrize("name", ["error", "graph", "bytes", "time", "frames", "paths"])
+@pytest.mark.parametrize("name", ["error", "graph", "bytes", "rules", "time", "frames", "paths"])
 def test_no_label_is_drawn_over_another_or_cut_off(findings, name):
     figure = plot_study(findings, name)
     canvas = FigureCanvasAgg(figure)

@@ -47,6 +47,7 @@ def test_what_was_found_holds_the_errors_of_the_summary(small):
         (("network.iterations", "7"), True, False),
         (("network.graph", "path"), True, False),
         (("network.consensus", "{algorithm: constant, epsilon: 0.2}"), True, False),
+        (("network.conditions.loss", "0.3"), True, False),
         (("fusion.rule", "eq17"), True, False),
         (("filter.n_particles", "33"), True, True),
         (("seed", "1"), True, True),
@@ -64,7 +65,13 @@ def test_a_part_is_known_by_what_it_depends_on(small, override, for_cameras, for
 
 
 @pytest.mark.parametrize(
-    "override", [("network.iterations", "7"), ("network.graph", "path"), ("fusion.rule", "eq17")]
+    "override",
+    [
+        ("network.iterations", "7"),
+        ("network.graph", "path"),
+        ("network.conditions.loss", "0.3"),
+        ("fusion.rule", "eq17"),
+    ],
 )
 def test_cpf_does_not_depend_on_what_its_key_leaves_out(small, summary_of, override):
     one, other = (summary_of(small, *overrides) for overrides in (SHORT, [*SHORT, override]))

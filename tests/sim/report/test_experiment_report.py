@@ -55,6 +55,7 @@ def test_a_report_has_every_study_and_the_summarys_figures(dcpf, page):
         "What was run",
         TITLE,
         *("ways", "frames", "bytes", "strips"),
+        "What the cameras saw in small (robust), seed 0",
     ]
     assert TITLE in read.text()
     assert "is missing" not in read.text()
@@ -64,6 +65,29 @@ def test_a_report_has_every_study_and_the_summarys_figures(dcpf, page):
     mean = rows[4][rows[0].index("rmse_mean")]  # of DCPF with two rounds, the table's last
     assert read.rows("small (robust)")["DCPF"][2] == f"{float(mean):.3f}"
     assert len(re.findall("<svg", read.source)) == 1 + len(studies)
+
+
+def test_a_report_shows_one_run_as_the_runs_own_report_does(dcpf, ran, small, page):
+    given = ["--set", "filter.n_particles=10"]
+    assert dcpf("compare", small, *given, *BRIEF).exit_code == 0
+    folder = ran(small, "--frames", 3, *given)
+    assert dcpf("report", folder).exit_code == 0
+
+    shown, own = page(Path("out/report.html")), page(folder / "report.html")
+
+    assert [image.get("src") for image in shown.all("img")] == [image.get("src") for image in own.all("img")]
+    assert [image.get("alt") for image in shown.all("img")] == [image.get("alt") for image in own.all("img")]
+    assert shown.rows("What each link carries") == own.rows("What each link carries")
+
+
+def test_it_is_the_run_in_which_least_is_swept(dcpf, small, page):
+    assert dcpf("compare", small, *SWEEP, *BRIEF).exit_code == 0
+
+    read = page(Path("out/report.html"))
+
+    assert "With network.iterations = 2, filter.n_particles = 20." in read.text()
+    links = read.rows("What each link carries").values()
+    assert {cells[1] for cells in links if cells[0] == "rounds"} == {"2"}
 
 
 @pytest.mark.parametrize(

@@ -114,9 +114,8 @@ def test_pictures_become_smaller_where_there_are_too_many(ran, small, monkeypatc
     why = choose_moments(results)
     previews = told_again(results, assembly, why, lambda _: None)
     monkeypatch.setattr(stills, "_MIN_WIDTH_PX", 60)
-    monkeypatch.setattr(stills, "LIMIT_BYTES", 40_000)
 
-    moments = moments_of(results, assembly, previews, why)
+    moments = moments_of(results, assembly, previews, why, limit_bytes=40_000)
 
     pictures = [still for moment in moments for still in moment.stills]
     assert sum(len(each.source) for each in pictures) <= 40_000
@@ -170,6 +169,43 @@ def test_a_recording_gives_the_same_pictures_as_the_run_told_again(dcpf, small, 
     (again / "run.mcap").unlink()
     assert dcpf("report", again).exit_code == 0
     assert page(folder / "report.html").source == page(again / "report.html").source
+
+
+def test_a_recording_alone_tells_what_the_folder_tells(dcpf, small, page, tmp_path):
+    folder = tmp_path / "filmed"
+    assert dcpf("run", small, "--in-process", "--record", "--out", folder).exit_code == 0
+    assert dcpf("report", folder).exit_code == 0
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    shutil.copy(folder / "run.mcap", alone / "mine.mcap")
+
+    result = dcpf("report", alone / "mine.mcap")
+
+    assert result.stdout.strip() == str(alone / "report.html")
+    read, whole = page(alone / "report.html"), page(folder / "report.html")
+    for caption in ("Errors over frames", "What each link carries"):
+        assert read.rows(caption) == whole.rows(caption)
+    assert [image.get("src") for image in read.all("img")] == [image.get("src") for image in whole.all("img")]
+    assert read.text("pre") == whole.text("pre")
+    assert not [each for each in read.all("p") if each.get("class") == "note"]
+
+
+def test_of_a_recording_that_was_cut_off_there_is_what_is_there(dcpf, small, page, tmp_path):
+    folder = tmp_path / "filmed"
+    assert dcpf("run", small, "--in-process", "--record", "--out", folder).exit_code == 0
+    whole = (folder / "run.mcap").read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: int(0.7 * len(whole))])
+
+    assert dcpf("report", cut).exit_code == 0
+
+    read = page(tmp_path / "report.html")
+    assert "interrupted" in read.text()
+    assert "What each link carries" not in read.source
+    cut.write_bytes(b"no recording")
+    refused = dcpf("report", cut)
+    assert refused.exit_code == 2
+    assert "is no recording of a run" in refused.stderr
 
 
 def test_what_files_say_is_text(dcpf, ran, small, page):
