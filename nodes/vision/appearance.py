@@ -39,6 +39,7 @@ class Appearance:
         miss_distance: d₀², the distance at which the target counts as not seen.
         variance: σ² of the likelihood.
         own: Whether the camera saw it with its own eyes; else its neighbours described it.
+        good_sights: How often the camera has seen it well since its neighbours described it.
     """
 
     histograms: Float[np.ndarray, "P C B"]
@@ -47,6 +48,7 @@ class Appearance:
     miss_distance: float
     variance: float
     own: bool
+    good_sights: int = 0
 
 
 def normalize_counts(

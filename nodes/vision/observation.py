@@ -41,6 +41,9 @@ from nodes.vision.target import TargetOptions, project_boxes, visible_fraction
 
 GOOD_SIGHT = 0.9
 """Part of the target's box inside the picture from which a camera trusts its own eyes for a reference."""
+GOOD_SIGHTS = 5
+"""Good sights of the target from which a camera takes a reference of its own: until then, its pictures
+correct where it was told that the target is, and what lies beside the target is not taken for it."""
 LEAST_BOXES = 8000
 """Boxes that a thread counts at least: each makes its own integral images, however few they are."""
 
@@ -177,7 +180,7 @@ class ObservationModel:
     def updated(
         self, picture: Picture, position: Float[np.ndarray, " A"], sight: Sight, appearance: Appearance
     ) -> Appearance:
-        """The reference after the frame's estimate: Eq. 4, and a first look of one's own.
+        """The reference after the frame's estimate: Eq. 4, and a look of one's own.
 
         Args:
             picture: Of the frame.
@@ -190,13 +193,14 @@ class ObservationModel:
             return update_appearance(
                 appearance, sight.histograms, sight.squared_distance, sight.visible, update
             )
-        # Its own reference in place of the neighbours', at the first good sight of the target.
+        # Its own reference in place of the neighbours', after a few good sights of the target.
         if (
             sight.visible < GOOD_SIGHT
             or sight.squared_distance > update.max_distance * appearance.miss_distance
         ):
             return appearance
-        return self.first_appearance(picture, position) or appearance
+        seen = replace(appearance, good_sights=appearance.good_sights + 1)
+        return (self.first_appearance(picture, position) or seen) if seen.good_sights >= GOOD_SIGHTS else seen
 
     def box_distances(
         self, picture: Picture, boxes: Float[np.ndarray, "N 4"], appearance: Appearance
