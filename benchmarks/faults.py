@@ -39,20 +39,17 @@ def faults_of(seed, n_frames, names):
     """The faults of a run: the same camera and frame for all of them, by the seed."""
     rng = np.random.default_rng(seed)
     node, frame = str(rng.choice(names)), int(rng.integers(5, n_frames - 2 * SETTLED))
-    yaw_deg = float(rng.choice([-3.0, 3.0]))
     one = {"node": node, "frame": frame}
-    return (
-        node,
-        frame,
-        {
-            "kill": one | {"kind": "kill"},
-            "hang, 10 frames": one | {"kind": "hang", "frames": 10},
-            "restart after 8 frames": one | {"kind": "restart", "frames": 8},
-            "black pictures": one | {"kind": "black"},
-            "frozen picture": one | {"kind": "freeze"},
-            "knocked by 3 degrees": one | {"kind": "miscalibrate", "yaw_deg": yaw_deg},
-        },
-    )
+    turned = {"kind": "miscalibrate", "yaw_deg": float(rng.choice([-3.0, 3.0]))}
+    return frame, {
+        "kill": one | {"kind": "kill"},
+        "hang, 10 frames": one | {"kind": "hang", "frames": 10},
+        "restart after 8 frames": one | {"kind": "restart", "frames": 8},
+        "black pictures": one | {"kind": "black"},
+        "frozen picture": one | {"kind": "freeze"},
+        "knocked by 3 degrees": one | turned,
+        "3 degrees off from the start": one | turned | {"frame": 0},
+    }
 
 
 class Pictures:
@@ -72,7 +69,7 @@ class Bench:
     """The runs of one scenario and seed."""
 
     def __init__(self, path, seed):
-        self._path, self._seed = path, seed
+        self._path, self._seed, self._cpf = path, seed, {}
         plain = self._assembly([], cpf=False)
         self.scenario = plain.scenario
         self._pictures = {name: Pictures(plain.source(name), plain.scenario.frames) for name in plain.cameras}
@@ -85,9 +82,12 @@ class Bench:
         return {name: self._errors(results, track) for name, track in results.of("dcpf").items()}, results
 
     def cpf(self, faults=()):
-        """The errors of CPF by frame."""
-        results = self._run(self._assembly([("faults", json.dumps(faults))], cpf=True), with_cameras=False)
-        return self._errors(results, results.of("cpf")["central"])
+        """The errors of CPF by frame; those of the same faults are worked out once."""
+        told = json.dumps(faults)
+        if told not in self._cpf:
+            results = self._run(self._assembly([("faults", told)], cpf=True), with_cameras=False)
+            self._cpf[told] = self._errors(results, results.of("cpf")["central"])
+        return self._cpf[told]
 
     def _assembly(self, overrides, *, cpf):
         alone = ("baselines", f"{{cpf: {str(cpf).lower()}, single: false}}")
@@ -124,40 +124,50 @@ def measure(path, seed):
     """
     bench = Bench(path, seed)
     names = [camera.name for camera in bench.scenario.cameras]
-    node, frame, faults = faults_of(seed, bench.scenario.frames, names)
-    since = slice(frame, None)
+    frame, faults = faults_of(seed, bench.scenario.frames, names)
     perfect, _ = bench.dcpf()
-    found = {"no fault": (over(perfect, since), rmse(bench.cpf()[since]))}
-    # nodes and cameras: against CPF without the camera for as long
-    without = rmse(bench.cpf([faults["kill"]])[since])
+    found = {"no fault": (over(perfect, slice(frame, None)), rmse(bench.cpf()[frame:]))}
     apart = {}
     for case, fault in faults.items():
-        errors, results = bench.dcpf(faults=[fault])
-        returns = fault["kind"] in ("hang", "restart")
-        yardstick = rmse(bench.cpf([fault])[since]) if returns else without
-        gone = (node,) if returns or fault["kind"] == "kill" else ()
-        found[case] = over(errors, since, gone), yardstick
-        if returns:
-            n_axes, settled = bench.scenario.target.n_axes, frame + fault["frames"] + SETTLED
-            means = {name: results.means(("dcpf", name))[settled, :n_axes] for name in names}
-            others = np.mean([mean for name, mean in means.items() if name != node], axis=0)
-            apart[case] = float(np.linalg.norm(means[node] - others))
-    # parts: each against CPF of its cameras
-    groups = ", ".join(f"[{', '.join(part)}]" for part in PARTS)
-    parted = f"[{{groups: [{groups}], first_frame: {PARTED}, frames: {PARTED_FRAMES}}}]"
-    errors, _ = bench.dcpf([("network.conditions.partitions", parted)])
-    while_parted = slice(PARTED, PARTED + PARTED_FRAMES)
-    for part in PARTS:
-        others = [name for name in names if name not in part]
-        central = bench.cpf([{"kind": "kill", "node": name, "frame": PARTED} for name in others])
-        found[f"partition, {' and '.join(part)}"] = (
-            over(errors, while_parted, others),
-            rmse(central[while_parted]),
-        )
+        found[case], distance = of_fault(bench, names, fault)
+        if distance is not None:
+            apart[case] = distance
+    found |= in_parts(bench, names)
     # links: against the same run over perfect ones
     for case, overrides in LINKS.items():
         found[case] = over(bench.dcpf(overrides)[0], WHOLE), over(perfect, WHOLE)
     return seed, found, apart
+
+
+def of_fault(bench, names, fault):
+    """The survivors against CPF without the camera for as long, and how far off a returned node is."""
+    node, begin = fault["node"], max(fault["frame"], 1)
+    returns = fault["kind"] in ("hang", "restart")
+    errors, results = bench.dcpf(faults=[fault])
+    gone = [node] if returns or fault["kind"] == "kill" else []
+    central = bench.cpf([fault if returns else {"kind": "kill", "node": node, "frame": begin}])
+    pair = over(errors, slice(begin, None), gone), rmse(central[begin:])
+    if not returns:
+        return pair, None
+    settled = begin + fault["frames"] + SETTLED
+    means = {name: results.means(("dcpf", name))[settled, : bench.scenario.target.n_axes] for name in names}
+    others = np.mean([mean for name, mean in means.items() if name != node], axis=0)
+    return pair, float(np.linalg.norm(means[node] - others))
+
+
+def in_parts(bench, names):
+    """Each part of a network that has fallen apart, against CPF of its cameras."""
+    groups = ", ".join(f"[{', '.join(part)}]" for part in PARTS)
+    parted = f"[{{groups: [{groups}], first_frame: {PARTED}, frames: {PARTED_FRAMES}}}]"
+    errors, _ = bench.dcpf([("network.conditions.partitions", parted)])
+    while_parted = slice(PARTED, PARTED + PARTED_FRAMES)
+    found = {}
+    for part in PARTS:
+        others = [name for name in names if name not in part]
+        central = bench.cpf([{"kind": "kill", "node": name, "frame": PARTED} for name in others])
+        case = f"partition, {' and '.join(part)}"
+        found[case] = over(errors, while_parted, others), rmse(central[while_parted])
+    return found
 
 
 def table(rows):

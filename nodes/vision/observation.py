@@ -37,6 +37,7 @@ from nodes.vision.color import (
 )
 from nodes.vision.likelihood import LikelihoodOptions, background_constants, log_likelihoods
 from nodes.vision.pattern import Pattern, coefficients, full_codebook, pattern_of, squared_distances
+from nodes.vision.standstill import Background, background_of, likeness
 from nodes.vision.target import TargetOptions, project_boxes, visible_fraction
 
 GOOD_SIGHT = 0.9
@@ -64,6 +65,9 @@ class ObservationOptions(Options):
     sampling: SamplingOptions = SamplingOptions()
     likelihood: LikelihoodOptions = LikelihoodOptions()
     model_update: ModelUpdateOptions = ModelUpdateOptions()
+    min_likeness: float | None = Field(default=None, ge=0, le=1)
+    """How well the background must correlate with that of the camera's first picture. Below, a smart camera
+    has been knocked, or is covered: it tells the others nothing until it looks there again. null: never."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,6 +102,7 @@ class ObservationModel:
         target: What it looks for.
         options: How it measures.
         gain: The first picture on a sparse grid; None before the first.
+        background: Its fine structure, if the options ask for it.
         processor: The emulated array that measures, if one does.
     """
 
@@ -105,11 +110,18 @@ class ObservationModel:
     target: TargetOptions
     options: ObservationOptions
     gain: GainReference | None = None
+    background: Background | None = None
     processor: SimdLikelihood | None = None
 
     def with_first(self, image: UInt8[np.ndarray, "H W 3"]) -> "ObservationModel":
-        """The same model, with gains measured against this picture from now on."""
-        return replace(self, gain=gain_reference(image))
+        """The same model, with gain and background held against this picture from now on."""
+        background = None if self.options.min_likeness is None else background_of(image)
+        return replace(self, gain=gain_reference(image), background=background)
+
+    def stands_still(self, image: UInt8[np.ndarray, "H W 3"]) -> bool:
+        """Whether the camera looks where it did in its first picture, as far as the options ask."""
+        least = self.options.min_likeness
+        return least is None or self.background is None or likeness(image, self.background) >= least
 
     @property
     def off_array(self) -> "ObservationModel":
