@@ -64,6 +64,7 @@ class SmartCamera:
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
         self._image: UInt8[np.ndarray, "H W 3"] | None = None
+        self._stood = False  # whether a picture was like the first one
         self._knocked: dict[str, int] = {}  # in how many `frames`, and the `first` of them
         self._estimate = setup.start.moments
         self._frames: dict[int, FrameInProgress] = {}
@@ -89,7 +90,8 @@ class SmartCamera:
         previous, predicted = self._predict(index)
         # reweight by the own picture: u, p, v, r
         usable, self._image = self._is_usable(index, image), image
-        local = self._filter_locally(picture, predicted, self._appearance if usable else None)
+        believed = usable and self._appearance is not None and not self._appearance.doubted
+        local = self._filter_locally(picture, predicted, self._appearance if believed else None)
         self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
         self._frames[index] = FrameInProgress(index, picture, self._done_frame, previous, predicted, usable)
@@ -203,7 +205,10 @@ class SmartCamera:
 
     def _is_usable(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> bool:
         """Whether a picture tells anything: a camera that hangs, or that was knocked, is as good as blind."""
-        if not self._model.stands_still(image):
+        still = self._model.stands_still(image)
+        # what has never looked like the first picture, as where that was black, cannot tell
+        self._stood |= still
+        if self._stood and not still:
             first, frames = self._knocked.get("first", index), self._knocked.get("frames", 0)
             self._knocked = {"frames": frames + 1, "first": first}
             return False

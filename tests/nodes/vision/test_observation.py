@@ -105,14 +105,16 @@ def test_a_uniform_scene_has_a_likelihood_too():
 def test_a_camera_takes_its_own_reference_after_a_few_good_sights():
     model, appearance = ready(OPTIONS["joint"])
     told = model.first_appearance(model.look(paint(THERE)), THERE)
-    told = replace(told, own=False)
+    told = replace(told, own=False, doubted=True)
     hidden, seen = model.look(paint(None)), model.look(paint(HERE))
     for good in range(GOOD_SIGHTS):
         assert updated(model, hidden, HERE, told) is told
         assert told.good_sights == good
+        assert told.doubted
         assert not told.own
         told = updated(model, seen, HERE, told)
     assert told.own
+    assert not told.doubted
     np.testing.assert_array_equal(told.histograms, appearance.histograms)
 
 

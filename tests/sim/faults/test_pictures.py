@@ -10,6 +10,7 @@ from network.messages import EstimateMessage
 from sim.assembly import Assembly
 from sim.faults.options import MiscalibrateOptions
 from sim.faults.pictures import moved
+from sim.running.in_process import InProcess
 from sim.running.results import Results, summarize
 from sim.scenario.loading import load_scenario
 
@@ -95,3 +96,16 @@ def test_asking_whether_cameras_stand_still_changes_no_run_in_which_they_do(smal
     )
     assert load_scenario(small, []).filter.min_likeness == 0.5
     assert asked == not_asked
+
+
+def test_a_camera_that_is_blind_at_the_start_joins_in_when_it_has_seen_the_target_well(small):
+    black = {"kind": "black", "node": "B", "frame": 0, "frames": 2}
+    overrides = [("frames", "12"), ("baselines.single", "false"), ("faults", json.dumps([black]))]
+    run = InProcess(Assembly(load_scenario(small, overrides)), None, with_cameras=True)
+    doubted = [
+        run._cameras["B"]._appearance.doubted
+        for message in run.run(with_visibility=False, watched=False)
+        if isinstance(message, EstimateMessage) and (message.node, message.estimator) == ("B", "dcpf")
+    ]
+    # black in frames 0 and 1, then five good sights
+    assert doubted == [True] * 6 + [False] * 6
