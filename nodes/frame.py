@@ -19,7 +19,7 @@ class FrameInProgress:
         since: The last frame that was done when it began.
         previous: The particles of the frame before, as far as they were known then.
         predicted: The same, propagated.
-        fresh: Whether the picture is another than the one before.
+        usable: Whether the picture is a measurement: new, and of what the camera should look at.
     """
 
     index: int
@@ -27,7 +27,7 @@ class FrameInProgress:
     since: int
     previous: Particles
     predicted: Particles
-    fresh: bool = True
+    usable: bool = True
 
 
 def is_new(image: UInt8[np.ndarray, "H W 3"], last: UInt8[np.ndarray, "H W 3"] | None) -> bool:

@@ -65,6 +65,8 @@ class SmartCamera:
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
         self._image: UInt8[np.ndarray, "H W 3"] | None = None
+        self._stood = False  # whether a picture was like the first one
+        self._knocked: dict[str, int] = {}  # in how many `frames`, and the `first` of them
         self._estimate = setup.start.moments
         self._frames: dict[int, FrameInProgress] = {}
         self._last_frame = 0
@@ -88,11 +90,12 @@ class SmartCamera:
         # predict: χ(k) ~ P(χ(k) | χ(k-1))
         previous, predicted = self._predict(index)
         # reweight by the own picture: u, p, v, r
-        fresh, self._image = is_new(image, self._image), image
-        local = self._filter_locally(picture, predicted, self._appearance if fresh else None)
+        usable, self._image = self._is_usable(index, image), image
+        believed = usable and self._appearance is not None and not self._appearance.doubted
+        local = self._filter_locally(picture, predicted, self._appearance if believed else None)
         self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
-        self._frames[index] = FrameInProgress(index, picture, self._done_frame, previous, predicted, fresh)
+        self._frames[index] = FrameInProgress(index, picture, self._done_frame, previous, predicted, usable)
         packed = pack(local, len(self._rounds.of(index).members), self._setup.fusion)
         return self._with_result(self._rounds.begin(index, packed))
 
@@ -182,12 +185,14 @@ class SmartCamera:
         """What it has counted, by name.
 
         Frames in which the local or fused difference of information matrices was no density's (Eq. 17);
-        messages of no use, by reason (`unused`); what a frame costs on the emulated array (`simd`).
+        messages of no use, by reason (`unused`); in how many `frames` it did not look where it should, and
+        the `first` of them (`knocked`); what a frame costs on the emulated array (`simd`).
         """
         report = self._array_report
         return {
             **self._indefinite,
             "unused": self._rounds.counters,
+            "knocked": self._knocked,
             **({"simd": report.figures} if report else {}),
         }
 
@@ -206,6 +211,17 @@ class SmartCamera:
             outgoing += self._finish(frame) if index else self._finish_first(frame)
             self._done_frame = index
         return outgoing
+
+    def _is_usable(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> bool:
+        """Whether a picture tells anything: a camera that hangs, or that was knocked, is as good as blind."""
+        still = self._model.stands_still(image)
+        # what has never looked like the first picture, as where that was black, cannot tell
+        self._stood |= still
+        if self._stood and not still:
+            first, frames = self._knocked.get("first", index), self._knocked.get("frames", 0)
+            self._knocked = {"frames": frames + 1, "first": first}
+            return False
+        return is_new(image, self._image)
 
     def _predict(self, index: int) -> tuple[Particles, Particles]:
         """The particles of the last frame that is done, moved to the frame before this one, and to it."""
@@ -252,7 +268,7 @@ class SmartCamera:
         threshold, n_threads = setup.filter.resampling.threshold, setup.filter.threads
         self._particles = resample_if_degenerate(posterior, threshold, self._fusion_rng, n_threads)
         # update the reference (Eq. 4)
-        visible = frame.fresh and self._update_appearance(frame.picture, estimate.position().mean)
+        visible = frame.usable and self._update_appearance(frame.picture, estimate.position().mean)
         message = self._message(frame, estimate, ess, visible=visible)
         if self._single is None:
             return (message,)

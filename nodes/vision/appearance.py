@@ -39,6 +39,8 @@ class Appearance:
         miss_distance: d₀², the distance at which the target counts as not seen.
         variance: σ² of the likelihood.
         own: Whether the camera saw it with its own eyes; else its neighbours described it.
+        good_sights: How often the camera has seen it well since its neighbours described it.
+        doubted: Whether the camera saw something else where the target was said to be.
     """
 
     histograms: Float[np.ndarray, "P C B"]
@@ -47,6 +49,8 @@ class Appearance:
     miss_distance: float
     variance: float
     own: bool
+    good_sights: int = 0
+    doubted: bool = False
 
 
 def normalize_counts(
@@ -87,11 +91,13 @@ def settled(own: Appearance | None, told: Appearance | None, options: ColorOptio
     """What a camera starts with: its own look at the start, or the network's mean.
 
     Its own, unless it has none, or has seen something else than the others: a pillar in front of the target
-    lies as well in the picture as the target would.
+    lies as well in the picture as the target would. Or its calibration is wrong: it is doubted until it has
+    seen the target where the others do.
     """
     if own is None or told is None:
         return own or told
-    return told if distance_to(own.histograms, told, options) > told.miss_distance else own
+    differs = distance_to(own.histograms, told, options) > told.miss_distance
+    return replace(told, doubted=True) if differs else own
 
 
 def update_appearance(

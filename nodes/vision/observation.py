@@ -42,10 +42,14 @@ from nodes.vision.likelihood import (
     with_miss_floor,
 )
 from nodes.vision.pattern import Pattern, coefficients, full_codebook, pattern_of, squared_distances
+from nodes.vision.standstill import Background, background_of, likeness
 from nodes.vision.target import TargetOptions, project_boxes, visible_fraction
 
 GOOD_SIGHT = 0.9
 """Part of the target's box inside the picture from which a camera trusts its own eyes for a reference."""
+GOOD_SIGHTS = 5
+"""Good sights of the target from which a camera takes a reference of its own: until then, its pictures
+correct where it was told that the target is, and what lies beside the target is not taken for it."""
 LEAST_BOXES = 8000
 """Boxes that a thread counts at least: each makes its own integral images, however few they are."""
 
@@ -66,6 +70,9 @@ class ObservationOptions(Options):
     sampling: SamplingOptions = SamplingOptions()
     likelihood: LikelihoodOptions = LikelihoodOptions()
     model_update: ModelUpdateOptions = ModelUpdateOptions()
+    min_likeness: float | None = Field(default=None, ge=0, le=1)
+    """How well the background must correlate with that of the camera's first picture. Below, a smart camera
+    has been knocked, or is covered: it tells the others nothing until it looks there again. null: never."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,6 +107,7 @@ class ObservationModel:
         target: What it looks for.
         options: How it measures.
         gain: The first picture on a sparse grid; None before the first.
+        background: Its fine structure, if the options ask for it.
         processor: The emulated array that measures, if one does.
     """
 
@@ -107,11 +115,18 @@ class ObservationModel:
     target: TargetOptions
     options: ObservationOptions
     gain: GainReference | None = None
+    background: Background | None = None
     processor: SimdLikelihood | None = None
 
     def with_first(self, image: UInt8[np.ndarray, "H W 3"]) -> "ObservationModel":
-        """The same model, with gains measured against this picture from now on."""
-        return replace(self, gain=gain_reference(image))
+        """The same model, with gain and background held against this picture from now on."""
+        background = None if self.options.min_likeness is None else background_of(image)
+        return replace(self, gain=gain_reference(image), background=background)
+
+    def stands_still(self, image: UInt8[np.ndarray, "H W 3"]) -> bool:
+        """Whether the camera looks where it did in its first picture, as far as the options ask."""
+        least = self.options.min_likeness
+        return least is None or self.background is None or likeness(image, self.background) >= least
 
     @property
     def off_array(self) -> "ObservationModel":
@@ -172,7 +187,7 @@ class ObservationModel:
     def updated(
         self, picture: Picture, position: Float[np.ndarray, " A"], sight: Sight, appearance: Appearance
     ) -> Appearance:
-        """The reference after the frame's estimate: Eq. 4, and a first look of one's own.
+        """The reference after the frame's estimate: Eq. 4, and a look of one's own.
 
         Args:
             picture: Of the frame.
@@ -185,13 +200,14 @@ class ObservationModel:
             return update_appearance(
                 appearance, sight.histograms, sight.squared_distance, sight.visible, update
             )
-        # Its own reference in place of the neighbours', at the first good sight of the target.
+        # Its own reference in place of the neighbours', after a few good sights of the target.
         if (
             sight.visible < GOOD_SIGHT
             or sight.squared_distance > update.max_distance * appearance.miss_distance
         ):
             return appearance
-        return self.first_appearance(picture, position) or appearance
+        seen = replace(appearance, good_sights=appearance.good_sights + 1)
+        return (self.first_appearance(picture, position) or seen) if seen.good_sights >= GOOD_SIGHTS else seen
 
     def box_distances(
         self, picture: Picture, boxes: Float[np.ndarray, "N 4"], appearance: Appearance

@@ -97,9 +97,9 @@ def run(
             results, dead = launch.run(), launch.dead
         summary = summarize(results, processes=1 if in_process else chosen.n_processes)
         summary |= {"died": dead, "sent_per_frame": sent_per_frame(results), "versions": versions()}
-        if in_process:
-            # The launcher has heard them come and go; here, the cameras' word for it must do.
-            for event in summary["members"]["events"]:
+        for event in summary["members"]["events"]:
+            # The launcher has heard them come and go; without one, the cameras' word for it must do.
+            if in_process or event["event"] == "knocked":
                 recorder.event(**event)
         recorder.finish(summary)
     if as_json:

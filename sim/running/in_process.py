@@ -199,6 +199,9 @@ class InProcess:
             yield from self._deliver()
             deadlines = self._deadlines_ns()
             due = [*deadlines.values(), *(due_ns for due_ns, _ in self._slow.values())]
+            if self._central is not None:
+                # it waits until it notices
+                due += [ns for name, ns in self._noticed_ns.items() if name in self._central.waiting_for]
             if until_ns is None and not due:
                 return
             events = [*due, *self._noticed_ns.values()]

@@ -5,30 +5,39 @@ from typing import Any
 
 import numpy as np
 
-from network.messages import EstimateMessage
+from network.messages import EstimateMessage, StatusMessage
 
 Told = Mapping[int, EstimateMessage]
 """A camera's estimates by frame."""
 
 
-def membership(tracks: Mapping[str, Told], cameras: Sequence[str], frames: int) -> dict[str, Any]:
-    """Members per frame, and when cameras were lost and came back.
+def membership(
+    tracks: Mapping[str, Told], cameras: Sequence[str], frames: int, statuses: Mapping[str, StatusMessage]
+) -> dict[str, Any]:
+    """Members per frame, and when cameras were lost, came back, or no longer looked where they should.
 
     Args:
         tracks: The joint estimates of each camera.
         cameras: All cameras.
         frames: Of the run.
+        statuses: The last status of each node.
 
     Returns:
         `per_frame`: by camera, how many it counted in each frame, None where it told nothing; `events`: a
-        camera is `lost` where no other that tells counts it any more, and `back` where all do again.
+        camera is `lost` where no other that tells counts it any more, and `back` where all do again;
+        `knocked` in the first of the `frames` in which it looked elsewhere than in the beginning.
     """
     per_frame = {
         name: [len(told[frame].members) if frame in told else None for frame in range(frames)]
         for name, told in sorted(tracks.items())
     }
-    events = []
+    events: list[dict[str, Any]] = []
     for camera in cameras:
+        told = statuses[camera].counters.get("knocked") if camera in statuses else None
+        if isinstance(told, Mapping) and told:
+            events.append(
+                {"frame": told["first"], "event": "knocked", "node": camera, "frames": told["frames"]}
+            )
         there = True
         for frame in range(frames):
             counts = [camera in told[frame].members for told in _others(tracks, camera) if frame in told]

@@ -165,7 +165,9 @@ def summarize(results: Results, *, processes: int) -> dict[str, Any]:
             "cpf": _tracking(results, [cpf] if cpf else []),
         },
         "network": network_figures(scenario, results.first_statuses, results.statuses),
-        "members": membership(joint, [camera.name for camera in scenario.cameras], scenario.frames),
+        "members": membership(
+            joint, [camera.name for camera in scenario.cameras], scenario.frames, results.statuses
+        ),
         "fusion": _fusion(results),
         **_array(results),
         "timing": {**results.timing, **_timing(results)},

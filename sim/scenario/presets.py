@@ -39,6 +39,7 @@ ROBUST: Mapping[str, Any] = {
         "sampling": {"grid": [15, 15], "kernel": "epanechnikov"},
         "likelihood": {"calibration": "background"},
         "model_update": {"alpha": 0.05},
+        "min_likeness": 0.5,
     },
     "fusion": {"rule": "net_information", "local_particles": "shared", "proposal": "optimal"},
 }
@@ -46,7 +47,7 @@ ROBUST: Mapping[str, Any] = {
 
 ONE_CAMERA: Mapping[str, Any] = {
     "target": {"start": {"position_error": 1.0, "position_deviation": 2.0, "velocity_deviation": 30.0}},
-    "filter": {"dynamics": {"position_variance": 16.0, "velocity_variance": 900.0}},
+    "filter": {"dynamics": {"position_variance": 16.0, "velocity_variance": 900.0}, "min_likeness": None},
 }
 """What both presets begin with in the image plane, in pixels."""
 

@@ -11,6 +11,7 @@ from nodes.vision.appearance import ModelUpdateOptions
 from nodes.vision.color import ColorOptions
 from nodes.vision.likelihood import LikelihoodOptions
 from nodes.vision.observation import (
+    GOOD_SIGHTS,
     ObservationModel,
     ObservationOptions,
     surrounding_boxes,
@@ -108,15 +109,20 @@ def test_a_uniform_scene_has_a_likelihood_too():
     assert np.isfinite(model.log_likelihoods(picture, np.stack([HERE, THERE]), appearance)).all()
 
 
-def test_a_camera_takes_its_own_reference_at_its_first_good_sight():
+def test_a_camera_takes_its_own_reference_after_a_few_good_sights():
     model, appearance = ready(OPTIONS["joint"])
     told = model.first_appearance(model.look(paint(THERE)), THERE)
-    told = replace(told, own=False)
+    told = replace(told, own=False, doubted=True)
     hidden, seen = model.look(paint(None)), model.look(paint(HERE))
-    assert updated(model, hidden, HERE, told) is told
-    taken = updated(model, seen, HERE, told)
-    assert taken.own
-    np.testing.assert_array_equal(taken.histograms, appearance.histograms)
+    for good in range(GOOD_SIGHTS):
+        assert updated(model, hidden, HERE, told) is told
+        assert told.good_sights == good
+        assert told.doubted
+        assert not told.own
+        told = updated(model, seen, HERE, told)
+    assert told.own
+    assert not told.doubted
+    np.testing.assert_array_equal(told.histograms, appearance.histograms)
 
 
 def test_the_reference_follows_slowly_changing_looks_only_if_asked_to():

@@ -7,6 +7,8 @@ import pytest
 
 from network.codec import encode_public
 from network.messages import EstimateMessage
+from sim.assembly import Assembly
+from sim.running.in_process import run_in_process
 from sim.running.results import Results, summarize
 from sim.scenario.loading import load_scenario
 
@@ -95,3 +97,16 @@ def test_the_same_faults_give_the_same_run(small, told):
         for _ in range(2)
     ]
     assert runs[0] == runs[1]
+
+
+@pytest.mark.parametrize("kind", ["kill", "hang"])
+def test_the_central_node_goes_on_without_a_camera_also_where_no_camera_tracks(small, kind):
+    fault = {"kind": kind, "node": "B", "frame": 4} | ({"frames": 5} if kind == "hang" else {})
+    scenario = load_scenario(small, [*FEW, ("faults", json.dumps([fault]))])
+    results = Results(scenario)
+    for message in run_in_process(Assembly(scenario), with_cameras=False):
+        results.add(message)
+    members = [results.tracks["cpf", "central"][frame].members for frame in range(16)]
+    assert members[3] == tuple(NAMES)
+    assert members[4] == members[8] == ("A", "C", "D")
+    assert members[10] == (("A", "C", "D") if kind == "kill" else tuple(NAMES))

@@ -5,10 +5,13 @@ import json
 import numpy as np
 import pytest
 
+from network.codec import encode_public
+from network.messages import EstimateMessage
 from sim.assembly import Assembly
 from sim.faults.options import MiscalibrateOptions
 from sim.faults.pictures import moved
-from sim.running.results import Results
+from sim.running.in_process import InProcess
+from sim.running.results import Results, summarize
 from sim.scenario.loading import load_scenario
 
 
@@ -71,3 +74,38 @@ def test_a_camera_without_news_adds_nothing_to_what_the_others_know(small, told,
     errors = results.errors(("dcpf", "A"))
     assert errors[4:].max() < 0.3
     assert not any(results.tracks["dcpf", "B"][frame].visible for frame in range(5, 12))
+
+
+def test_a_camera_that_was_knocked_is_found_told_and_left_out(small, told):
+    knock = {"kind": "miscalibrate", "node": "B", "frame": 4, "frames": 6, "yaw_deg": 3}
+    overrides = [("frames", "12"), ("baselines.single", "false"), ("faults", json.dumps([knock]))]
+    results = Results(load_scenario(small, overrides))
+    for message in told(small, *overrides):
+        results.add(message)
+    (event,) = summarize(results, processes=1)["members"]["events"]
+    assert event == {"frame": 4, "event": "knocked", "node": "B", "frames": 6}
+    seen = [results.tracks["dcpf", "B"][frame].visible for frame in range(12)]
+    assert seen == [True] * 4 + [False] * 6 + [True] * 2
+    assert results.errors(("dcpf", "B")).max() < 0.3
+
+
+def test_asking_whether_cameras_stand_still_changes_no_run_in_which_they_do(small, told):
+    asked, not_asked = (
+        [encode_public(m) for m in told(small, *extra) if isinstance(m, EstimateMessage)]
+        for extra in ([], [("filter.min_likeness", "null")])
+    )
+    assert load_scenario(small, []).filter.min_likeness == 0.5
+    assert asked == not_asked
+
+
+def test_a_camera_that_is_blind_at_the_start_joins_in_when_it_has_seen_the_target_well(small):
+    black = {"kind": "black", "node": "B", "frame": 0, "frames": 2}
+    overrides = [("frames", "12"), ("baselines.single", "false"), ("faults", json.dumps([black]))]
+    run = InProcess(Assembly(load_scenario(small, overrides)), None, with_cameras=True)
+    doubted = [
+        run._cameras["B"]._appearance.doubted
+        for message in run.run(with_visibility=False, watched=False)
+        if isinstance(message, EstimateMessage) and (message.node, message.estimator) == ("B", "dcpf")
+    ]
+    # black in frames 0 and 1, then five good sights
+    assert doubted == [True] * 6 + [False] * 6

@@ -46,10 +46,15 @@ def test_nodes_that_are_stopped_or_started_again_come_back(summary):
     assert found["disagreement_per_frame_m"][-1] < 0.05
 
 
-def test_a_node_that_is_killed_on_purpose_is_no_accident(summary):
-    found, events = summary(40, {"kind": "kill", "node": "B", "frame": 8}, pace="lockstep")
+def test_a_node_that_is_killed_on_purpose_is_no_accident_and_one_that_is_knocked_says_so(summary):
+    kill = {"kind": "kill", "node": "B", "frame": 8}
+    knock = {"kind": "miscalibrate", "node": "C", "frame": 20, "frames": 10, "yaw_deg": 5}
+    found, events = summary(40, kill, knock, pace="lockstep")
     assert found["died"] == []
     assert ("killed", "B") in [(each["event"], each["node"]) for each in events]
+    told = {"event": "knocked", "node": "C", "frame": 20, "frames": 10}
+    assert told in events
+    assert told in found["members"]["events"]
     assert [found["members"]["per_frame"][name][-1] for name in ("A", "C", "D")] == [3] * 3
 
 
