@@ -49,6 +49,8 @@ class Membership:
 
     def is_down(self, neighbor: str, frame: int) -> bool:
         """Whether one of the two ends does without the other in a frame."""
+        if not self._down:
+            return False
         number = self._number(neighbor)
         return number is not None and self._down.get(number) == frame
 

@@ -7,7 +7,7 @@ is sent.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -52,9 +52,10 @@ def _require_covariance(mean: np.ndarray, covariance: np.ndarray) -> None:
         raise ValueError("covariance is not symmetric")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ConsensusMessage:
+class ConsensusMessage(NamedTuple):
     """A node's value in one round of consensus.
+
+    A named tuple of plain numbers: of nothing else does a run make as many, and these are the fastest made.
 
     Attributes:
         sender: The node.
@@ -66,14 +67,18 @@ class ConsensusMessage:
         down: Links that were down: their numbers, each with a frame (`network.membership`).
     """
 
-    kind: ClassVar[str] = "consensus"
     sender: str
     frame: int
     round: int
     degree: int
-    payload: Float[np.ndarray, " K"]
+    payload: tuple[float, ...]
     encoding: Encoding = "float64"
     down: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """As of the other messages; a named tuple's class has no attributes of its own."""
+        return "consensus"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -137,7 +137,8 @@ class ZenohTransport:
             receivers = [name for name in self._links.receivers(message) if name in self._alive]
             self.counters.count(message.kind, len(data), len(receivers))
             if isinstance(message, ConsensusMessage):
-                self.counters.sent.update(receivers)
+                for name in receivers:
+                    self.counters.sent[name] += 1
         else:
             self.counters.count(message.kind, len(data), 1)
         publisher = self._publishers[type(message)]
@@ -150,24 +151,28 @@ class ZenohTransport:
         """The next valid message of a linked node, None when time is up or the sender is gone."""
         inbox = self._inboxes[sender]
         deadline = time.monotonic() + timeout_s
+        # what has come already needs no watchdog
+        while (sample := inbox.try_recv() or self._await(sender, deadline)) is not None:
+            data = sample.payload.to_bytes()
+            if data == _WAKE_UP:
+                continue
+            try:
+                message = codec.decode(self._heard[sender], self._run, sender, data)
+            except RefusedMessage as refusal:
+                self.counters.refuse(sender, refusal.reason)
+                continue
+            if isinstance(message, ConsensusMessage):
+                self.counters.received[sender] += 1
+            return message
+        return None
+
+    def _await(self, sender: str, deadline: float) -> zenoh.Sample | None:
+        """The next sample, a wake-up perhaps; None when time is up or the sender is gone."""
+        if sender not in self._alive or time.monotonic() >= deadline:
+            return None
         self._wait = (sender, deadline)
         try:
-            while True:
-                over = sender not in self._alive or time.monotonic() >= deadline
-                sample = inbox.try_recv() if over else inbox.recv()
-                if sample is None:
-                    return None
-                data = sample.payload.to_bytes()
-                if data == _WAKE_UP:
-                    continue
-                try:
-                    message = codec.decode(self._heard[sender], self._run, sender, data)
-                except RefusedMessage as refusal:
-                    self.counters.refuse(sender, refusal.reason)
-                    continue
-                if isinstance(message, ConsensusMessage):
-                    self.counters.received[sender] += 1
-                return message
+            return self._inboxes[sender].recv()
         finally:
             self._wait = None
 

@@ -119,7 +119,7 @@ def test_the_paper_s_ring():
 
 
 def says(sender, frame, round_, *payload, degree=1):
-    return ConsensusMessage(sender, frame, round_, degree, np.array(payload, dtype=float))
+    return ConsensusMessage(sender, frame, round_, degree, tuple(map(float, payload)))
 
 
 def node(iterations=3, neighbors=("A", "B")):

@@ -77,7 +77,7 @@ def estimate_of(node, estimator, frame):
 
 
 def says(sender, round_, *payload):
-    return ConsensusMessage(sender, 0, round_, 1, np.array(payload, dtype=float))
+    return ConsensusMessage(sender, 0, round_, 1, tuple(map(float, payload)))
 
 
 @contextlib.contextmanager
