@@ -6,7 +6,7 @@ many nodes in one thread; both count alike.
 
 import logging
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
@@ -145,6 +145,20 @@ class Transport(Protocol):
 
         Returns:
             Its message, None when time is up or the sender is gone.
+        """
+
+    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage, ...]:
+        """The next message of each of several nodes that are linked to this one.
+
+        All are read when the last one is there. Who reads each as it comes is woken for every one, and finds
+        its caches filled by others.
+
+        Args:
+            senders: The nodes.
+            timeout_s: How long to wait for them all together; 0 only looks.
+
+        Returns:
+            Their messages, in the order of the senders, without those that are gone, silent or refused.
         """
 
     def offer(self, state: StateMessage) -> None:

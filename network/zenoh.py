@@ -149,21 +149,28 @@ class ZenohTransport:
 
     def receive(self, sender: str, timeout_s: float) -> PeerMessage | None:
         """The next valid message of a linked node, None when time is up or the sender is gone."""
-        inbox = self._inboxes[sender]
         deadline = time.monotonic() + timeout_s
+        while (data := self._next(sender, deadline)) is not None:
+            message = self._read(sender, data)
+            if message is not None:
+                return message
+        return None
+
+    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage, ...]:
+        """The next message of each of several linked nodes, but of those that are gone, silent or refused."""
+        deadline = time.monotonic() + timeout_s
+        came = [(sender, self._next(sender, deadline)) for sender in senders]
+        read = [self._read(sender, data) for sender, data in came if data is not None]
+        return tuple([message for message in read if message is not None])
+
+    def _next(self, sender: str, deadline: float) -> bytes | None:
+        """The next bytes of a linked node, None when time is up or it is gone."""
+        inbox = self._inboxes[sender]
         # what has come already needs no watchdog
         while (sample := inbox.try_recv() or self._await(sender, deadline)) is not None:
             data = sample.payload.to_bytes()
-            if data == _WAKE_UP:
-                continue
-            try:
-                message = codec.decode(self._heard[sender], self._run, sender, data)
-            except RefusedMessage as refusal:
-                self.counters.refuse(sender, refusal.reason)
-                continue
-            if isinstance(message, ConsensusMessage):
-                self.counters.received[sender] += 1
-            return message
+            if data != _WAKE_UP:
+                return data
         return None
 
     def _await(self, sender: str, deadline: float) -> zenoh.Sample | None:
@@ -175,6 +182,17 @@ class ZenohTransport:
             return self._inboxes[sender].recv()
         finally:
             self._wait = None
+
+    def _read(self, sender: str, data: bytes) -> PeerMessage | None:
+        """The message in a linked node's bytes; None, counted, where there is none."""
+        try:
+            message = codec.decode(self._heard[sender], self._run, sender, data)
+        except RefusedMessage as refusal:
+            self.counters.refuse(sender, refusal.reason)
+            return None
+        if isinstance(message, ConsensusMessage):
+            self.counters.received[sender] += 1
+        return message
 
     def offer(self, state: StateMessage) -> None:
         """Keeps what this node knows, for neighbours that ask."""

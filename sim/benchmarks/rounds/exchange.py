@@ -60,11 +60,13 @@ class ConsensusRounds:
         for said in consensus.begin(self._frame, np.arange(N_NUMBERS, dtype=float)):
             self._transport.send(said)
         while waiting := consensus.waiting_for():
-            message = self._transport.receive(waiting[0], PATIENCE_S)
-            if not isinstance(message, ConsensusMessage):
-                raise TimeoutError(f"{consensus.name} heard nothing of {waiting[0]}")
-            for reply in consensus.receive(message):
-                self._transport.send(reply)
+            messages = self._transport.receive_each(waiting, PATIENCE_S)
+            if not messages:
+                raise TimeoutError(f"{consensus.name} heard nothing of {', '.join(waiting)}")
+            for message in messages:
+                if isinstance(message, ConsensusMessage):
+                    for reply in consensus.receive(message):
+                        self._transport.send(reply)
         self._frame += 1
 
     def close(self) -> None:

@@ -7,6 +7,7 @@ import json
 import os
 import sys
 import time
+from collections import deque
 from statistics import median
 from typing import Any
 
@@ -80,8 +81,10 @@ def _timed(ways: dict[str, Exchange], barrier: PlainSockets, n_nodes: int, turns
     """The median time of a round of each way, and the processor time of one of a run's rounds, in µs."""
     wall: dict[str, list[float]] = {name: [] for name in ways}
     cpu: list[float] = []
+    order = deque(ways.items())
     for turn in range(turns + 1):
-        for name, way in ways.items():
+        order.rotate()  # nobody is always the first
+        for name, way in order:
             # everybody begins a turn together: after as many rounds as nodes, all have heard of all
             barrier.rounds(n_nodes)
             began, processor = time.perf_counter(), time.process_time()
