@@ -9,6 +9,7 @@ stands for its state as the others know it, so that both ends of a link move by 
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from network.graph import Graph
@@ -93,6 +94,7 @@ class AlgorithmOptions(Options):
         """
 
 
+@lru_cache
 def metropolis_weight(own_degree: int, neighbor_degree: int) -> float:
     """w_lj = 1 / (1 + max(d_l, d_j)) (Xiao, Boyd & Kim 2007)."""
     return 1.0 / (1 + max(own_degree, neighbor_degree))

@@ -39,10 +39,10 @@ class Weights(AlgorithmOptions):
 
     def step(self, state: State, own: ConsensusMessage, received: Sequence[ConsensusMessage]) -> State:
         """A step towards every neighbour."""
-        value, said, degree = state.value, own.payload, own.degree
+        value: Sequence[float] = state.value
         for message in received:
-            weight = self.weight(degree, message.degree)
+            weight = self.weight(own.degree, message.degree)
             # a_l(t) = a_l(t-1) + Σ_j w_lj (a_j(t-1) - a_l(t-1))
-            terms = zip(value, message.payload, said)  # noqa: B905 - of one length, by `fits`
-            value = tuple([a + weight * (b - c) for a, b, c in terms])
-        return State(value)
+            terms = zip(value, message.payload, own.payload)  # noqa: B905 - of one length, by `fits`
+            value = [a + weight * (b - c) for a, b, c in terms]
+        return State(tuple(value))
