@@ -79,7 +79,7 @@ class Consensus:
         self._present: list[str] = []  # neighbours of this frame: neither absent nor heard in a later one
         self._awaited: list[str] = []  # those of them that have said nothing yet in this round
         self._heard = dict.fromkeys(self.neighbors, _NOWHERE)
-        self._inbox: dict[tuple[int, str], ConsensusMessage] = {}  # of this frame, by round and sender
+        self._inbox: dict[int, dict[str, ConsensusMessage]] = {}  # of this frame, by round and sender
         self._early: dict[str, ConsensusMessage] = {}  # first rounds of later frames, by sender
 
     @property
@@ -181,7 +181,7 @@ class Consensus:
         self._absent.add(neighbor)
         self._present = [name for name in self._present if name != neighbor]
         self._awaited = [name for name in self._awaited if name != neighbor]
-        self._inbox.pop((round_ + 1, neighbor), None)
+        self._inbox.get(round_ + 1, {}).pop(neighbor, None)
         if not self.done:
             self._membership.lose(neighbor, frame)
 
@@ -198,7 +198,7 @@ class Consensus:
             self.counters["ahead"] += 1
         elif sender in self._absent:
             self.counters["absent"] += 1
-        elif self._membership.is_down(sender, frame):
+        elif self._membership.down and self._membership.is_down(sender, frame):
             # The other end goes on without this node: so does this one without it.
             self._leave_out(sender)
             self.counters["absent"] += 1
@@ -206,9 +206,9 @@ class Consensus:
             self.counters["shape"] += 1
         elif late:
             self.counters["late"] += 1
-            self._inbox[round_, sender] = message
+            self._inbox.setdefault(round_, {})[sender] = message
         else:
-            self._inbox[its_round, sender] = message
+            self._inbox.setdefault(its_round, {})[sender] = message
 
     def _enter_round(self, frame: int) -> tuple[ConsensusMessage, ...]:
         """Enters the round after those done, or ends the frame where there is none or nobody to talk to."""
@@ -223,7 +223,7 @@ class Consensus:
             return ()
         self._awaited = [name for name in self._present if self._heard[name] < position]
         payload = self._quantizer(self._algorithm.payload(self._state, degree))
-        down = self._membership.reports(frame)
+        down = self._membership.reports(frame) if self._membership.down else ()
         self._said = ConsensusMessage(
             self.name, frame, round_, degree, payload, self._quantizer.encoding, down
         )
@@ -243,11 +243,8 @@ class Consensus:
     def _step(self) -> None:
         """One round, with the messages that have come for it."""
         _, round_ = self._position
-        received = [
-            message
-            for name in self.neighbors
-            if (message := self._inbox.pop((round_, name), None)) is not None
-        ]
+        # in the order of the senders' names
+        received = sorted(self._inbox.pop(round_, {}).values())
         self._state = self._algorithm.step(self._state, self._said, received)
         self.rounds_done += 1
         self.rounds_in_all += 1

@@ -52,7 +52,17 @@ def _require_covariance(mean: np.ndarray, covariance: np.ndarray) -> None:
         raise ValueError("covariance is not symmetric")
 
 
-class ConsensusMessage(NamedTuple):
+class _OfARound(NamedTuple):
+    sender: str
+    frame: int
+    round: int
+    degree: int
+    payload: tuple[float, ...]
+    encoding: Encoding = "float64"
+    down: tuple[tuple[int, int], ...] = ()
+
+
+class ConsensusMessage(_OfARound):
     """A node's value in one round of consensus.
 
     A named tuple of plain numbers: of nothing else does a run make as many, and these are the fastest made.
@@ -67,18 +77,8 @@ class ConsensusMessage(NamedTuple):
         down: Links that were down: their numbers, each with a frame (`network.membership`).
     """
 
-    sender: str
-    frame: int
-    round: int
-    degree: int
-    payload: tuple[float, ...]
-    encoding: Encoding = "float64"
-    down: tuple[tuple[int, int], ...] = ()
-
-    @property
-    def kind(self) -> str:
-        """As of the other messages; a named tuple's class has no attributes of its own."""
-        return "consensus"
+    __slots__ = ()
+    kind: ClassVar[str] = "consensus"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -57,15 +57,13 @@ class Links:
             **dict.fromkeys(self.cameras, PixelsMessage),
         }
 
-    def receivers(self, message: PeerMessage) -> tuple[str, ...]:
-        """The nodes that a message goes to."""
-        match message:
-            case ConsensusMessage():
-                return self.neighbors
-            case PixelsMessage():
-                return self.sinks
-            case ConfirmMessage():
-                return self.cameras
+    def receivers(self) -> dict[type[PeerMessage], tuple[str, ...]]:
+        """The nodes that this one's messages go to, by what they are."""
+        return {
+            ConsensusMessage: self.neighbors,
+            PixelsMessage: self.sinks,
+            ConfirmMessage: self.cameras,
+        }
 
 
 def links_of(graph: Graph, sinks: Iterable[str] = ()) -> dict[str, Links]:

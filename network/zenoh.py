@@ -85,6 +85,7 @@ class ZenohTransport:
         self._inbox_keys = {sender: _KEYS[kind](run, sender) for sender, kind in self._heard.items()}
         self._token_key = keys.alive(run, name)
         self._alive: set[str] = set()
+        self._receivers: dict[type, tuple[str, ...]] = dict.fromkeys(links.receivers(), ())  # that are alive
         self._alive_changed = threading.Condition()
         self._orders: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._wait: tuple[str, float] | None = None
@@ -133,18 +134,17 @@ class ZenohTransport:
     def send(self, message: PeerMessage | EstimateMessage | StatusMessage | PreviewMessage) -> None:
         """Sends a message of this node to whom it concerns."""
         data = codec.encode(self._run, message)
-        if isinstance(message, PeerMessage):
-            receivers = [name for name in self._links.receivers(message) if name in self._alive]
+        publisher, receivers = self._publishers[type(message)], self._receivers.get(type(message))
+        if receivers is not None:
             self.counters.count(message.kind, len(data), len(receivers))
             if isinstance(message, ConsensusMessage):
                 for name in receivers:
                     self.counters.sent[name] += 1
         else:
             self.counters.count(message.kind, len(data), 1)
-        publisher = self._publishers[type(message)]
-        # those who ask want the joint estimate, not that of one camera on its own
-        if isinstance(message, StatusMessage) or getattr(message, "estimator", "single") != "single":
-            self._answers.keep(str(publisher.key_expr), data)
+            # those who ask want the joint estimate, not that of one camera on its own
+            if isinstance(message, StatusMessage) or getattr(message, "estimator", "single") != "single":
+                self._answers.keep(str(publisher.key_expr), data)
         publisher.put(data)
 
     def receive(self, sender: str, timeout_s: float) -> PeerMessage | None:
@@ -266,8 +266,13 @@ class ZenohTransport:
                 self._alive.add(name)
             else:
                 self._alive.discard(name)
-                self._wake(name)
+            self._receivers = {
+                kind: tuple(other for other in others if other in self._alive)
+                for kind, others in self._links.receivers().items()
+            }
             self._alive_changed.notify_all()
+        if sample.kind == zenoh.SampleKind.DELETE:
+            self._wake(name)
 
     def _watch(self) -> None:
         """Wakes the waiting node when its time is up."""

@@ -340,5 +340,5 @@ def test_no_sequence_of_messages_breaks_a_node(data):
                 m.receive(says(sender, at, round_, *np.zeros(data.draw(st.sampled_from([2, 2, 2, 3])))))
         assert 0 <= m.rounds_done <= 3
         assert m.done == (not m.waiting_for())
-        assert len(m._inbox) <= 4
+        assert sum(map(len, m._inbox.values())) <= 4
         assert len(m._early) <= 2
