@@ -166,8 +166,8 @@ class Consensus:
         if self.done:
             return ()
         self.counters["missed"] += len(self._awaited)
-        self._step()
-        return self._enter_round(self._position[0]) + self._advance()
+        self._awaited.clear()
+        return self._advance()
 
     def cut(self) -> None:
         """Ends the frame with the rounds done so far."""
@@ -236,18 +236,14 @@ class Consensus:
         """Completes rounds as long as nobody is waited for."""
         messages: tuple[ConsensusMessage, ...] = ()
         while not self.done and not self._awaited:
-            self._step()
-            messages += self._enter_round(self._position[0])
+            frame, round_ = self._position
+            # with what has come, in the order of the senders' names
+            received = sorted(self._inbox.pop(round_, {}).values())
+            self._state = self._algorithm.step(self._state, self._said, received)
+            self.rounds_done += 1
+            self.rounds_in_all += 1
+            messages += self._enter_round(frame)
         return messages
-
-    def _step(self) -> None:
-        """One round, with the messages that have come for it."""
-        _, round_ = self._position
-        # in the order of the senders' names
-        received = sorted(self._inbox.pop(round_, {}).values())
-        self._state = self._algorithm.step(self._state, self._said, received)
-        self.rounds_done += 1
-        self.rounds_in_all += 1
 
     def _finish(self) -> None:
         """Ends the frame: what still comes for it is old."""

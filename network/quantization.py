@@ -68,7 +68,8 @@ class Quantizer:
         there are; others that are not finite remain, for whoever writes them to refuse.
         """
         largest = LARGEST[self.encoding]
-        if not are_below(payload, largest):
+        # √Σ x² is no smaller than the largest of them: one call for nearly all; it passes NaN on
+        if not math.hypot(*payload) <= largest:
             payload = tuple(max(-largest, min(x, largest)) if math.isfinite(x) else x for x in payload)
         if self.encoding == "float64":
             return payload
@@ -86,7 +87,7 @@ class Quantizer:
 
 def are_below(numbers: tuple[float, ...], largest: float) -> bool:
     """Whether no magnitude is above a largest one; not so where one is infinite or NaN."""
-    # √Σ x², which NaN and infinity pass on, is no smaller than the largest of them: one call for nearly all
+    # again one call for nearly all
     return math.hypot(*numbers) <= largest or all(-largest <= x <= largest for x in numbers)
 
 
