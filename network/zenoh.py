@@ -175,11 +175,12 @@ class ZenohTransport:
 
     def _await(self, sender: str, deadline: float) -> zenoh.Sample | None:
         """The next sample, a wake-up perhaps; None when time is up or the sender is gone."""
+        inbox = self._inboxes[sender]
         if sender not in self._alive or time.monotonic() >= deadline:
-            return None
+            return inbox.try_recv()  # its last words may have come just before it left
         self._wait = (sender, deadline)
         try:
-            return self._inboxes[sender].recv()
+            return inbox.recv()
         finally:
             self._wait = None
 
