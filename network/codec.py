@@ -21,6 +21,7 @@ Reading never trusts: what is not exactly such a message is refused with its rea
 """
 
 import json
+import math
 import struct
 from dataclasses import replace
 from functools import lru_cache
@@ -47,7 +48,7 @@ from network.messages import (
     StatusMessage,
     TruthMessage,
 )
-from network.quantization import ENCODINGS, LARGEST, Encoding, half_exponent
+from network.quantization import ENCODINGS, LARGEST, Encoding, are_below, half_exponent
 
 MAX_PIXELS = 64_000_000
 MAX_JSON_BYTES = 1_000_000
@@ -55,11 +56,7 @@ MAX_JPEG_BYTES = 20_000_000
 MAX_MAGNITUDE = LARGEST["float64"]
 """Larger numbers are refused like infinity: sums and products of them would overflow."""
 
-_NUMBERS: dict[Encoding, np.dtype[np.floating]] = {
-    "float64": np.dtype("<f8"),
-    "float32": np.dtype("<f4"),
-    "float16": np.dtype("<f2"),
-}
+_FORMATS: dict[Encoding, str] = {"float64": "d", "float32": "f", "float16": "e"}
 _EXPONENT = struct.Struct("<h")
 _DOWN = struct.Struct("<II")
 _JSON: dict[type, TypeAdapter[Any]] = {
@@ -114,49 +111,48 @@ def encode_consensus(run: str, message: ConsensusMessage) -> bytes:
 
     Raises:
         ValueError: A number in it is not finite.
+        OverflowError: One is beyond what its encoding holds.
     """
-    payload = message.payload
-    if not _usable(payload):
+    _, _, round_, degree, payload, encoding, down = message
+    if not are_below(payload, MAX_MAGNITUDE):
         raise ValueError(
             f"{message.sender} has a value that is not finite in frame {message.frame}: {payload}"
         )
-    code = ENCODINGS.index(message.encoding) << 4 | (TELLS_DOWN if message.down else 0)
-    header = write_header(run, message, payload.size, message.round, message.degree, code)
-    scale = b""
-    if message.encoding == "float16":
+    code = ENCODINGS.index(encoding) << 4 | (TELLS_DOWN if down else 0)
+    data = write_header(run, message, len(payload), round_, degree, code)
+    if encoding == "float16":
         exponent = half_exponent(payload)
-        payload, scale = np.ldexp(payload, -exponent), _EXPONENT.pack(exponent)
-    numbers = payload.astype(_NUMBERS[message.encoding], copy=False).tobytes()
-    return header + scale + numbers + b"".join(_DOWN.pack(*report) for report in message.down)
+        payload = tuple(math.ldexp(number, -exponent) for number in payload)
+        data += _EXPONENT.pack(exponent)
+    data += _numbers(encoding, len(payload)).pack(*payload)
+    for report in down:
+        data += _DOWN.pack(*report)
+    return data
 
 
 def decode_consensus(run: str, sender: str, data: bytes) -> ConsensusMessage:
-    """A round's value; its payload is read-only, and a view of the data where they are float64.
+    """A round's value.
 
     Raises:
         RefusedMessage: The data are not such a message.
     """
     frame, size, round_, degree, code = read_header(ConsensusMessage, run, sender, data)
     encoding = ENCODINGS[code >> 4 & 0x07]
-    number, start = _NUMBERS[encoding], HEADER.size + _EXPONENT.size * (encoding == "float16")
-    end = start + number.itemsize * size
-    told = len(data) - end
+    numbers, start = _numbers(encoding, size), HEADER.size + _EXPONENT.size * (encoding == "float16")
+    told = len(data) - start - numbers.size
     if told % _DOWN.size or told < 0 or (told > 0) != bool(code & TELLS_DOWN):
         raise RefusedMessage("length")
     if round_ < 1:
         raise RefusedMessage("round")
-    payload = np.frombuffer(data, number, size, start)
-    if encoding != "float64":
-        payload = payload.astype(float)
-        if encoding == "float16":
-            # an exponent beyond all floats gives infinity, which is refused
-            (exponent,) = _EXPONENT.unpack_from(data, HEADER.size)
-            with np.errstate(over="ignore", invalid="ignore"):
-                payload = np.ldexp(payload, exponent)
-        payload.flags.writeable = False
-    if not _usable(payload):
+    payload = numbers.unpack_from(data, start)
+    if encoding == "float16":
+        # an exponent beyond all floats gives infinity, which is refused
+        (exponent,) = _EXPONENT.unpack_from(data, HEADER.size)
+        with np.errstate(over="ignore", invalid="ignore"):
+            payload = tuple(np.ldexp(payload, exponent).tolist())
+    if not are_below(payload, MAX_MAGNITUDE):
         raise RefusedMessage("not-finite")
-    down = tuple(_DOWN.iter_unpack(data[end:])) if told else ()
+    down = tuple(_DOWN.iter_unpack(data[-told:])) if told else ()
     return ConsensusMessage(sender, frame, round_, degree, payload, encoding, down)
 
 
@@ -267,6 +263,12 @@ def unpack_symmetric(triangle: Float[np.ndarray, "*C K"], size: int) -> Float[np
 
 
 @lru_cache
+def _numbers(encoding: Encoding, size: int) -> struct.Struct:
+    """So many numbers, one after the other."""
+    return struct.Struct(f"<{size}{_FORMATS[encoding]}")
+
+
+@lru_cache
 def _places(size: int) -> Int[np.ndarray, "D D"]:
     """Where in the upper triangle each entry of the matrix stands."""
     places = np.zeros((size, size), dtype=np.intp)
@@ -287,9 +289,3 @@ def _from_json(kind: type, data: bytes) -> Any:
     except ValidationError as error:
         found = error.errors(include_url=False, include_context=False)[0]["type"]
         raise RefusedMessage(_JSON_REASONS.get(found, "fields")) from error
-
-
-def _usable(payload: Float[np.ndarray, " K"]) -> bool:
-    """Whether all numbers are finite and small enough to compute with; not so for NaN."""
-    # A round has so few that Python's own numbers are faster than NumPy's.
-    return all(-MAX_MAGNITUDE <= number <= MAX_MAGNITUDE for number in payload.tolist())

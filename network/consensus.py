@@ -76,14 +76,16 @@ class Consensus:
         self._position = _NOWHERE
         self._gone: set[str] = set()
         self._absent: set[str] = set()  # in this frame: the gone, also those restored during it
+        self._present: list[str] = []  # neighbours of this frame: neither absent nor heard in a later one
+        self._awaited: list[str] = []  # those of them that have said nothing yet in this round
         self._heard = dict.fromkeys(self.neighbors, _NOWHERE)
-        self._inbox: dict[tuple[int, str], ConsensusMessage] = {}  # of this frame, by round and sender
+        self._inbox: dict[int, dict[str, ConsensusMessage]] = {}  # of this frame, by round and sender
         self._early: dict[str, ConsensusMessage] = {}  # first rounds of later frames, by sender
 
     @property
     def value(self) -> Float[np.ndarray, " K"]:
         """The estimate, after the rounds done so far, of the average over all nodes."""
-        return np.empty(0) if self._state is None else self._state.value
+        return np.array(() if self._state is None else self._state.value)
 
     @property
     def members(self) -> tuple[str, ...]:
@@ -109,10 +111,13 @@ class Consensus:
         last_frame, _ = self._position
         if not self.done or frame <= last_frame:
             raise ValueError(f"{self.name} cannot begin frame {frame}: it is in frame {last_frame}")
-        self._state = self._algorithm.begin(np.array(value, dtype=float), self._state)
+        self._state = self._algorithm.begin(tuple(value.tolist()), self._state)
         self.rounds_done = 0
         self.done = False
         self._absent = set(self._gone)
+        self._present = [
+            name for name, last in self._heard.items() if name not in self._absent and last < (frame + 1, 0)
+        ]
         first = self._enter_round(frame)
         due = [message for message in self._early.values() if message.frame <= frame]
         for message in due:
@@ -126,20 +131,17 @@ class Consensus:
         last = self._heard.get(sender)
         if last is None:
             self.counters["stranger"] += 1
-        elif position == last:
-            self.counters["duplicate"] += 1
-        elif position < last:
-            self.counters["old"] += 1
-        else:
-            self._heard[sender] = position
-            self._keep(message)
-        return self._advance()
+            return ()
+        if position <= last:
+            self.counters["duplicate" if position == last else "old"] += 1
+            return ()
+        self._heard[sender] = position
+        self._keep(message)
+        return self._await_no_more(sender, position)
 
     def waiting_for(self) -> tuple[str, ...]:
         """The neighbours whose message of this round may still come, sorted by name."""
-        if self.done:
-            return ()
-        return self._behind(self._position)
+        return tuple(self._awaited)
 
     def drop(self, neighbor: str) -> tuple[ConsensusMessage, ...]:
         """Goes on without a neighbour from now on; what it has said for this round still counts."""
@@ -153,18 +155,19 @@ class Consensus:
 
     def miss(self, neighbor: str, frame: int, round_: int) -> tuple[ConsensusMessage, ...]:
         """A neighbour's message is known not to come: its round is done without it."""
-        if neighbor not in self._absent and self._heard[neighbor] < (frame, round_):
-            self._heard[neighbor] = (frame, round_)
-            self.counters["missed"] += 1
-        return self._advance()
+        if neighbor in self._absent or (frame, round_) <= self._heard[neighbor]:
+            return ()
+        self._heard[neighbor] = (frame, round_)
+        self.counters["missed"] += 1
+        return self._await_no_more(neighbor, (frame, round_))
 
     def expire(self) -> tuple[ConsensusMessage, ...]:
         """Does this round without those that are late; they take part in the next one."""
         if self.done:
             return ()
-        self.counters["missed"] += len(self.waiting_for())
-        self._step()
-        return self._enter_round(self._position[0]) + self._advance()
+        self.counters["missed"] += len(self._awaited)
+        self._awaited.clear()
+        return self._advance()
 
     def cut(self) -> None:
         """Ends the frame with the rounds done so far."""
@@ -172,64 +175,67 @@ class Consensus:
             self.counters["cut"] += 1
             self._finish()
 
+    def _await_no_more(self, sender: str, position: _Position) -> tuple[ConsensusMessage, ...]:
+        """A neighbour that has come to a position says nothing more of the rounds before."""
+        if position >= self._position:
+            if sender in self._awaited:
+                self._awaited.remove(sender)
+            if position[0] > self._position[0] and sender in self._present:
+                self._present.remove(sender)
+        return () if self._awaited else self._advance()
+
     def _leave_out(self, neighbor: str) -> None:
         """Does without a neighbour for the rest of the frame, and says so."""
         frame, round_ = self._position
         self._absent.add(neighbor)
-        self._inbox.pop((round_ + 1, neighbor), None)
+        self._present = [name for name in self._present if name != neighbor]
+        self._awaited = [name for name in self._awaited if name != neighbor]
+        self._inbox.get(round_ + 1, {}).pop(neighbor, None)
         if not self.done:
             self._membership.lose(neighbor, frame)
-
-    def _present(self) -> tuple[str, ...]:
-        """The neighbours that take part in this frame: neither gone nor already in a later one."""
-        frame, _ = self._position
-        return self._behind((frame + 1, 0))
-
-    def _behind(self, position: _Position) -> tuple[str, ...]:
-        """The neighbours of this frame that have said nothing yet from a position on."""
-        absent = self._absent
-        # a list, not a generator: this runs several times a round
-        return tuple([name for name, last in self._heard.items() if last < position and name not in absent])
 
     def _keep(self, message: ConsensusMessage) -> None:
         """Keeps a message that this round, the next one, or a later frame's first can use."""
         frame, round_ = self._position
+        sender, its_frame, its_round = message.sender, message.frame, message.round
         # what is told of links counts when its frame comes
-        if message.frame <= frame:
-            self._membership.hear(message.down, message.frame)
-        late = (message.frame, message.round) < self._position
-        if late and not (self._algorithm.uses_late and message.frame == frame and not self.done):
+        if message.down and its_frame <= frame:
+            self._membership.hear(message.down, its_frame)
+        late = its_frame < frame or (its_frame == frame and its_round < round_)
+        if late and not (self._algorithm.uses_late and its_frame == frame and not self.done):
             self.counters["old"] += 1
-        elif message.frame > frame and message.round == 1:
-            self._early[message.sender] = message
-        elif message.frame > frame or message.round > min(round_ + 1, self._iterations):
+        elif its_frame > frame and its_round == 1:
+            self._early[sender] = message
+        elif its_frame > frame or its_round > round_ + 1 or its_round > self._iterations:
             self.counters["ahead"] += 1
-        elif message.sender in self._absent:
+        elif sender in self._absent:
             self.counters["absent"] += 1
-        elif self._membership.is_down(message.sender, frame):
+        elif self._membership.down and self._membership.is_down(sender, frame):
             # The other end goes on without this node: so does this one without it.
-            self._leave_out(message.sender)
+            self._leave_out(sender)
             self.counters["absent"] += 1
         elif not self._algorithm.fits(self._state, message):
             self.counters["shape"] += 1
+        elif late:
+            self.counters["late"] += 1
+            self._inbox.setdefault(round_, {})[sender] = message
         else:
-            self.counters.update(["late"] * late)
-            self._inbox[max(message.round, round_), message.sender] = message
+            self._inbox.setdefault(its_round, {})[sender] = message
 
     def _enter_round(self, frame: int) -> tuple[ConsensusMessage, ...]:
         """Enters the round after those done, or ends the frame where there is none or nobody to talk to."""
         round_ = self.rounds_done + 1
-        self._position = (frame, round_)
-        present = self._present()
-        degree = len(present)
+        self._position = position = (frame, round_)
+        degree = len(self._present)
         if not self.rounds_done and degree < len(self.neighbors):
-            for name in self._heard.keys() - present:
+            for name in self._heard.keys() - self._present:
                 self._membership.lose(name, frame)
         if self.rounds_done == self._iterations or (degree == 0 and (self.rounds_done or not self.neighbors)):
             self._finish()
             return ()
+        self._awaited = [name for name in self._present if self._heard[name] < position]
         payload = self._quantizer(self._algorithm.payload(self._state, degree))
-        down = self._membership.reports(frame)
+        down = self._membership.reports(frame) if self._membership.down else ()
         self._said = ConsensusMessage(
             self.name, frame, round_, degree, payload, self._quantizer.encoding, down
         )
@@ -241,23 +247,20 @@ class Consensus:
     def _advance(self) -> tuple[ConsensusMessage, ...]:
         """Completes rounds as long as nobody is waited for."""
         messages: tuple[ConsensusMessage, ...] = ()
-        while not self.done and not self.waiting_for():
-            self._step()
-            messages += self._enter_round(self._position[0])
+        while not self.done and not self._awaited:
+            frame, round_ = self._position
+            # with what has come, in the order of the senders' names
+            received = sorted(self._inbox.pop(round_, {}).values())
+            self._state = self._algorithm.step(self._state, self._said, received)
+            self.rounds_done += 1
+            self.rounds_in_all += 1
+            messages += self._enter_round(frame)
         return messages
-
-    def _step(self) -> None:
-        """One round, with the messages that have come for it."""
-        _, round_ = self._position
-        found = [self._inbox.pop((round_, name), None) for name in self.neighbors]
-        received = [message for message in found if message is not None]
-        self._state = self._algorithm.step(self._state, self._said, received)
-        self.rounds_done += 1
-        self.rounds_in_all += 1
 
     def _finish(self) -> None:
         """Ends the frame: what still comes for it is old."""
         frame, _ = self._position
         self.done = True
         self._position = (frame, self._iterations + 1)
+        self._awaited.clear()
         self._inbox.clear()

@@ -72,6 +72,12 @@ class DisturbedTransport(ZenohTransport):
                 return None
             time.sleep(min(left_s, _LOOK_S))
 
+    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | Loss, ...]:
+        """The next message of each of several linked nodes that its channel has let through by now."""
+        deadline = time.monotonic() + timeout_s
+        came = [self.receive(sender, max(deadline - time.monotonic(), 0.0)) for sender in senders]
+        return tuple([message for message in came if message is not None])
+
     def _receive_in_lockstep(self, sender: str, timeout_s: float) -> PeerMessage | Loss | None:
         due = self._due[sender]
         if not due:

@@ -14,6 +14,15 @@ TELLS_DOWN = 0x80
 HEADER = struct.Struct("<BBHHHQII")
 
 _KINDS: dict[type[PeerMessage], int] = {ConsensusMessage: 1, PixelsMessage: 2, ConfirmMessage: 3}
+_CODES: dict[type[PeerMessage], frozenset[int]] = {
+    **{kind: frozenset([number]) for kind, number in _KINDS.items()},
+    ConsensusMessage: frozenset(
+        _KINDS[ConsensusMessage] | encoding << 4 | tells
+        for encoding in range(len(ENCODINGS))
+        for tells in (0, TELLS_DOWN)
+    ),
+}
+"""What the kind's byte may be."""
 
 
 def write_header(run: str, message: PeerMessage, a: int, b: int, c: int, code: int = 0) -> bytes:
@@ -44,8 +53,7 @@ def read_header(
     version, code, a, b, c, run_id, sender_id, frame = HEADER.unpack_from(data)
     if version != VERSION:
         raise RefusedMessage("version")
-    known = code & 0x70 < len(ENCODINGS) << 4 if kind is ConsensusMessage else code & 0xF0 == 0
-    if code & 0x0F != _KINDS[kind] or not known:
+    if code not in _CODES[kind]:
         raise RefusedMessage("kind")
     if run_id != _digest(run, 8):
         raise RefusedMessage("run")

@@ -19,6 +19,9 @@ class Membership:
 
     A report is about one frame and counts for as many frames as it may need to cross the network, ⌈(C-1) / t⌉
     with t rounds a frame: a link that is up again is told down by nobody, and the reports about it run out.
+
+    Attributes:
+        down: Links that were down lately, by number, each with the last frame; nearly always empty.
     """
 
     def __init__(self, name: str, graph: Graph, iterations: int) -> None:
@@ -33,7 +36,7 @@ class Membership:
         self._edges = sorted(graph.edges)
         self._numbers = {edge: number for number, edge in enumerate(self._edges)}
         self._horizon = max(1, math.ceil((len(graph.names) - 1) / max(iterations, 1)))
-        self._down: dict[int, int] = {}
+        self.down: dict[int, int] = {}
 
     def lose(self, neighbor: str, frame: int) -> None:
         """The node does without a neighbour in a frame."""
@@ -50,15 +53,13 @@ class Membership:
     def is_down(self, neighbor: str, frame: int) -> bool:
         """Whether one of the two ends does without the other in a frame."""
         number = self._number(neighbor)
-        return number is not None and self._down.get(number) == frame
+        return number is not None and self.down.get(number) == frame
 
     def reports(self, frame: int) -> tuple[Report, ...]:
         """What is to be told in a frame."""
-        if not self._down:
-            return ()
         oldest = frame - self._horizon + 1
-        self._down = {number: when for number, when in self._down.items() if when >= oldest}
-        return tuple(sorted((number, when) for number, when in self._down.items() if when <= frame))
+        self.down = {number: when for number, when in self.down.items() if when >= oldest}
+        return tuple(sorted((number, when) for number, when in self.down.items() if when <= frame))
 
     def members(self, frame: int) -> tuple[str, ...]:
         """The nodes that the node is connected to, itself among them, sorted by name."""
@@ -70,7 +71,7 @@ class Membership:
         return tuple(sorted(own))
 
     def _take(self, number: int, frame: int) -> None:
-        self._down[number] = max(frame, self._down.get(number, -1))
+        self.down[number] = max(frame, self.down.get(number, -1))
 
     def _number(self, neighbor: str) -> int | None:
         edge = (neighbor, self._name) if neighbor < self._name else (self._name, neighbor)

@@ -82,7 +82,7 @@ class MemoryNetwork:
         if not isinstance(message, PeerMessage):
             self.counters[sender].count(message.kind, len(data), 1)
             return
-        receivers = [name for name in self._links[sender].receivers(message) if name in self._alive]
+        receivers = [name for name in self._links[sender].receivers()[type(message)] if name in self._alive]
         self.counters[sender].count(message.kind, len(data), len(receivers))
         for receiver in receivers:
             arrivals: tuple[int, ...] = (now_ns,)

@@ -9,6 +9,7 @@ Half precision ends at 65504, where information begins. Its numbers are taken re
 the message carries, so that the largest lies between 2¹⁴ and 2¹⁵; one 2²⁹ times smaller loses digits.
 """
 
+import math
 from typing import Literal, get_args
 
 import numpy as np
@@ -60,33 +61,40 @@ class Quantizer:
         self.encoding = encoding
         self._rng = rng
 
-    def __call__(self, payload: Float[np.ndarray, " K"]) -> Float[np.ndarray, " K"]:
+    def __call__(self, payload: tuple[float, ...]) -> tuple[float, ...]:
         """A payload that its encoding holds exactly.
 
         Numbers that are too large, such as those of a node that believed nonsense, become the largest
         there are; others that are not finite remain, for whoever writes them to refuse.
         """
         largest = LARGEST[self.encoding]
-        # a payload has so few numbers that Python's own are faster than NumPy's
-        numbers = payload.tolist()
-        if numbers and (max(numbers) > largest or min(numbers) < -largest):
-            payload = np.where(np.isinf(payload), payload, np.clip(payload, -largest, largest))
+        # √Σ x² is no smaller than the largest of them: one call for nearly all; it passes NaN on
+        if not math.hypot(*payload) <= largest:
+            payload = tuple(max(-largest, min(x, largest)) if math.isfinite(x) else x for x in payload)
         if self.encoding == "float64":
             return payload
+        numbers = np.array(payload)
         if self.encoding == "float32":
-            return _rounded(payload, np.dtype(np.float32), self._rng)
+            return tuple(_rounded(numbers, np.dtype(np.float32), self._rng).tolist())
         exponent = half_exponent(payload)
-        rounded = np.ldexp(_rounded(np.ldexp(payload, -exponent), np.dtype(np.float16), self._rng), exponent)
+        scaled = _rounded(np.ldexp(numbers, -exponent), np.dtype(np.float16), self._rng)
+        rounded = tuple(np.ldexp(scaled, exponent).tolist())
         if half_exponent(rounded) != exponent:
             # the largest was rounded up to the next power of two: the smallest may not fit any more
             return self(rounded)
         return rounded
 
 
-def half_exponent(payload: Float[np.ndarray, " K"]) -> int:
+def are_below(numbers: tuple[float, ...], largest: float) -> bool:
+    """Whether no magnitude is above a largest one; not so where one is infinite or NaN."""
+    # again one call for nearly all
+    return math.hypot(*numbers) <= largest or all(-largest <= x <= largest for x in numbers)
+
+
+def half_exponent(payload: tuple[float, ...]) -> int:
     """The power of two by which numbers are divided before they are written in half precision."""
-    _, exponent = np.frexp(np.abs(payload).max(initial=0.0))
-    return int(exponent) - _TOP_EXPONENT
+    _, exponent = math.frexp(max(map(abs, payload), default=0.0))
+    return exponent - _TOP_EXPONENT
 
 
 def _rounded(

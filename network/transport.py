@@ -6,7 +6,7 @@ many nodes in one thread; both count alike.
 
 import logging
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
@@ -57,15 +57,13 @@ class Links:
             **dict.fromkeys(self.cameras, PixelsMessage),
         }
 
-    def receivers(self, message: PeerMessage) -> tuple[str, ...]:
-        """The nodes that a message goes to."""
-        match message:
-            case ConsensusMessage():
-                return self.neighbors
-            case PixelsMessage():
-                return self.sinks
-            case ConfirmMessage():
-                return self.cameras
+    def receivers(self) -> dict[type[PeerMessage], tuple[str, ...]]:
+        """The nodes that this one's messages go to, by what they are."""
+        return {
+            ConsensusMessage: self.neighbors,
+            PixelsMessage: self.sinks,
+            ConfirmMessage: self.cameras,
+        }
 
 
 def links_of(graph: Graph, sinks: Iterable[str] = ()) -> dict[str, Links]:
@@ -160,6 +158,20 @@ class Transport(Protocol):
 
         Returns:
             Its message, that it was lost where that is known, None when time is up or the sender is gone.
+        """
+
+    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | Loss, ...]:
+        """The next message of each of several nodes that are linked to this one.
+
+        All are read when the last one is there. Who reads each as it comes is woken for every one, and finds
+        its caches filled by others.
+
+        Args:
+            senders: The nodes.
+            timeout_s: How long to wait for them all together; 0 only looks.
+
+        Returns:
+            Their messages, in the order of the senders, without those that are gone, silent or refused.
         """
 
     def offer(self, state: StateMessage) -> None:

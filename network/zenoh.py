@@ -85,6 +85,7 @@ class ZenohTransport:
         self._inbox_keys = {sender: _KEYS[kind](run, sender) for sender, kind in self._heard.items()}
         self._token_key = keys.alive(run, name)
         self._alive: set[str] = set()
+        self._receivers: dict[type, tuple[str, ...]] = dict.fromkeys(links.receivers(), ())  # that are alive
         self._alive_changed = threading.Condition()
         self._orders: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._wait: tuple[str, float] | None = None
@@ -133,43 +134,66 @@ class ZenohTransport:
     def send(self, message: PeerMessage | EstimateMessage | StatusMessage | PreviewMessage) -> None:
         """Sends a message of this node to whom it concerns."""
         data = codec.encode(self._run, message)
-        if isinstance(message, PeerMessage):
-            receivers = [name for name in self._links.receivers(message) if name in self._alive]
+        publisher, receivers = self._publishers[type(message)], self._receivers.get(type(message))
+        if receivers is not None:
             self.counters.count(message.kind, len(data), len(receivers))
             if isinstance(message, ConsensusMessage):
-                self.counters.sent.update(receivers)
+                for name in receivers:
+                    self.counters.sent[name] += 1
         else:
             self.counters.count(message.kind, len(data), 1)
-        publisher = self._publishers[type(message)]
-        # those who ask want the joint estimate, not that of one camera on its own
-        if isinstance(message, StatusMessage) or getattr(message, "estimator", "single") != "single":
-            self._answers.keep(str(publisher.key_expr), data)
+            # those who ask want the joint estimate, not that of one camera on its own
+            if isinstance(message, StatusMessage) or getattr(message, "estimator", "single") != "single":
+                self._answers.keep(str(publisher.key_expr), data)
         publisher.put(data)
 
     def receive(self, sender: str, timeout_s: float) -> PeerMessage | Loss | None:
         """The next valid message of a linked node, None when time is up or the sender is gone."""
-        inbox = self._inboxes[sender]
         deadline = time.monotonic() + timeout_s
+        while (data := self._next(sender, deadline)) is not None:
+            message = self._read(sender, data)
+            if message is not None:
+                return message
+        return None
+
+    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | Loss, ...]:
+        """The next message of each of several linked nodes, but of those that are gone, silent or refused."""
+        deadline = time.monotonic() + timeout_s
+        came = [(sender, self._next(sender, deadline)) for sender in senders]
+        read = [self._read(sender, data) for sender, data in came if data is not None]
+        return tuple([message for message in read if message is not None])
+
+    def _next(self, sender: str, deadline: float) -> bytes | None:
+        """The next bytes of a linked node, None when time is up or it is gone."""
+        inbox = self._inboxes[sender]
+        # what has come already needs no watchdog
+        while (sample := inbox.try_recv() or self._await(sender, deadline)) is not None:
+            data = sample.payload.to_bytes()
+            if data != _WAKE_UP:
+                return data
+        return None
+
+    def _await(self, sender: str, deadline: float) -> zenoh.Sample | None:
+        """The next sample, a wake-up perhaps; None when time is up or the sender is gone."""
+        inbox = self._inboxes[sender]
+        if sender not in self._alive or time.monotonic() >= deadline:
+            return inbox.try_recv()  # its last words may have come just before it left
         self._wait = (sender, deadline)
         try:
-            while True:
-                over = sender not in self._alive or time.monotonic() >= deadline
-                sample = inbox.try_recv() if over else inbox.recv()
-                if sample is None:
-                    return None
-                data = sample.payload.to_bytes()
-                if data == _WAKE_UP:
-                    continue
-                try:
-                    message = codec.decode(self._heard[sender], self._run, sender, data)
-                except RefusedMessage as refusal:
-                    self.counters.refuse(sender, refusal.reason)
-                    continue
-                if isinstance(message, ConsensusMessage):
-                    self.counters.received[sender] += 1
-                return message
+            return inbox.recv()
         finally:
             self._wait = None
+
+    def _read(self, sender: str, data: bytes) -> PeerMessage | None:
+        """The message in a linked node's bytes; None, counted, where there is none."""
+        try:
+            message = codec.decode(self._heard[sender], self._run, sender, data)
+        except RefusedMessage as refusal:
+            self.counters.refuse(sender, refusal.reason)
+            return None
+        if isinstance(message, ConsensusMessage):
+            self.counters.received[sender] += 1
+        return message
 
     def offer(self, state: StateMessage) -> None:
         """Keeps what this node knows, for neighbours that ask."""
@@ -243,8 +267,13 @@ class ZenohTransport:
                 self._alive.add(name)
             else:
                 self._alive.discard(name)
-                self._wake(name)
+            self._receivers = {
+                kind: tuple(other for other in others if other in self._alive)
+                for kind, others in self._links.receivers().items()
+            }
             self._alive_changed.notify_all()
+        if sample.kind == zenoh.SampleKind.DELETE:
+            self._wake(name)
 
     def _watch(self) -> None:
         """Wakes the waiting node when its time is up."""

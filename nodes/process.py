@@ -217,21 +217,27 @@ def _rounds(node: SmartCamera, begun: dict[int, float], shell: Shell, frame: int
 
 
 def _wait(node: SmartCamera, index: int, begun: float, patience_s: float, shell: Shell) -> None:
-    """Waits for the next message of a frame, or for the end of the round that it is in."""
+    """Waits for the messages of a frame's round, or for its end."""
     round_ = node.open_rounds.get(index)
     if round_ is None:
         return
-    neighbor = node.waiting_for(index)[0]
+    neighbors = node.waiting_for(index)
     deadline = begun + shell.pace.round_deadline_s(round_)
     left_s = max(deadline - time.monotonic(), 0.0)
-    message = shell.transport.receive(neighbor, min(left_s, patience_s))
-    if isinstance(message, ConsensusMessage):
-        _send(node.on_message(message), shell)
-    elif isinstance(message, Loss):
-        _send(node.on_loss(message), shell)
-    elif not shell.transport.alive(neighbor):
-        _send(node.on_lost(neighbor), shell)
-    elif time.monotonic() >= deadline:
+    messages = shell.transport.receive_each(neighbors, min(left_s, patience_s))
+    for message in messages:
+        if isinstance(message, ConsensusMessage):
+            _send(node.on_message(message), shell)
+        elif isinstance(message, Loss):
+            _send(node.on_loss(message), shell)
+    if len(messages) == len(neighbors):
+        return
+    # those who are gone, or late
+    silent = set(neighbors).difference(message.sender for message in messages)
+    gone = sorted(name for name in silent if not shell.transport.alive(name))
+    for name in gone:
+        _send(node.on_lost(name), shell)
+    if not gone and time.monotonic() >= deadline and node.open_rounds.get(index) == round_:
         _send(node.on_round_deadline(index), shell)
 
 

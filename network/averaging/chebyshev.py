@@ -70,21 +70,21 @@ class TunedChebyshev:
 
     def fits(self, state: Flowing, message: ConsensusMessage) -> bool:
         """Whether it is as long as the node's own."""
-        return message.payload.shape == state.value.shape
+        return len(message.payload) == len(state.value)
 
     def step(self, state: Flowing, own: ConsensusMessage, received: Sequence[ConsensusMessage]) -> Flowing:
         """A step over every link, and on in the direction of the last one."""
         omega = next_relaxation(state.relaxation, self.spectrum.contraction)
-        value = state.value.copy()
+        value, said = np.array(state.value), np.array(own.payload)
         flows = {}
         for message in received:
             # f_lj(t) = ω ε (a_j - a_l) + (ω - 1) f_lj(t-1);  a_l(t) = a_l(t-1) + Σ_j f_lj(t)
-            flow = omega * self.spectrum.step * (message.payload - own.payload)
+            flow = omega * self.spectrum.step * (np.array(message.payload) - said)
             if message.sender in state.flows:
                 flow += (omega - 1) * state.flows[message.sender]
             value += flow
             flows[message.sender] = flow
-        return Flowing(value, omega, flows)
+        return Flowing(tuple(value.tolist()), omega, flows)
 
 
 def next_relaxation(relaxation: float, contraction: float) -> float:

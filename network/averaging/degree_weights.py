@@ -35,12 +35,14 @@ class Weights(AlgorithmOptions):
 
     def fits(self, state: State, message: ConsensusMessage) -> bool:
         """Whether it is as long as the node's own."""
-        return message.payload.shape == state.value.shape
+        return len(message.payload) == len(state.value)
 
     def step(self, state: State, own: ConsensusMessage, received: Sequence[ConsensusMessage]) -> State:
         """A step towards every neighbour."""
-        value = state.value.copy()
+        value: Sequence[float] = state.value
         for message in received:
+            weight = self.weight(own.degree, message.degree)
             # a_l(t) = a_l(t-1) + Σ_j w_lj (a_j(t-1) - a_l(t-1))
-            value += self.weight(own.degree, message.degree) * (message.payload - own.payload)
-        return State(value)
+            terms = zip(value, message.payload, own.payload)  # noqa: B905 - of one length, by `fits`
+            value = [a + weight * (b - c) for a, b, c in terms]
+        return State(tuple(value))

@@ -45,9 +45,10 @@ class Voice:
 
     def after(self, payload: Vector) -> "Voice":
         """The same after a message, which may be silent."""
-        if not payload.size:
+        if not payload:
             return self
-        return Voice(payload, np.maximum(self.peak, np.abs(payload)))
+        last = np.array(payload)
+        return Voice(last, np.maximum(self.peak, np.abs(last)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,27 +85,28 @@ class EventTriggered(AlgorithmOptions):
 
     def payload(self, state: Talk, degree: int) -> Vector:
         """The value if it has moved, nothing otherwise."""
-        peaks = [np.abs(state.value), state.own.peak, *(voice.peak for voice in state.heard.values())]
-        moved = distance(state.value, state.own.last, np.max(peaks, axis=0)) > self.threshold
-        return state.value if moved else state.value[:0]
+        value = np.array(state.value)
+        peaks = [np.abs(value), state.own.peak, *(voice.peak for voice in state.heard.values())]
+        moved = distance(value, state.own.last, np.max(peaks, axis=0)) > self.threshold
+        return state.value if moved else ()
 
     def fits(self, state: Talk, message: ConsensusMessage) -> bool:
         """Whether it is as long as the node's own, or empty."""
-        return message.payload.shape in (state.value.shape, (0,))
+        return len(message.payload) in (len(state.value), 0)
 
     def step(self, state: Talk, own: ConsensusMessage, received: Sequence[ConsensusMessage]) -> Talk:
         """A step towards what every neighbour last said, over the links that do not rest."""
         here = state.own.after(own.payload)
-        value, heard = state.value.copy(), dict(state.heard)
+        value, heard = np.array(state.value), dict(state.heard)
         for message in received:
-            there = heard.get(message.sender, _silent(value)).after(message.payload)
+            there = heard.get(message.sender, _silent(state.value)).after(message.payload)
             heard[message.sender] = there
-            news = own.payload.size or message.payload.size
+            news = own.payload or message.payload
             apart = distance(there.last, here.last, np.maximum(there.peak, here.peak))
             if news or apart > _REST * self.threshold:
                 # a_l(t) = a_l(t-1) + Σ_j w_lj (â_j - â_l)
                 value += metropolis_weight(own.degree, message.degree) * (there.last - here.last)
-        return Talk(value, here, heard)
+        return Talk(tuple(value.tolist()), here, heard)
 
 
 def distance(
@@ -116,4 +118,4 @@ def distance(
 
 
 def _silent(value: Vector) -> Voice:
-    return Voice(np.zeros_like(value), np.zeros_like(value))
+    return Voice(np.zeros(len(value)), np.zeros(len(value)))

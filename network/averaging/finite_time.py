@@ -82,34 +82,34 @@ class TunedFiniteTime:
 
     def payload(self, state: Watchful, degree: int) -> Vector:
         """The value, and the alarm if there is one."""
-        return np.append(state.value, state.alarm) if state.alarm else state.value
+        return (*state.value, float(state.alarm)) if state.alarm else state.value
 
     def fits(self, state: Watchful, message: ConsensusMessage) -> bool:
         """Whether it is as long as the node's own, or longer by an alarm."""
-        return message.payload.ndim == 1 and 0 <= message.payload.size - state.value.size <= 1
+        return 0 <= len(message.payload) - len(state.value) <= 1
 
     def step(self, state: Watchful, own: ConsensusMessage, received: Sequence[ConsensusMessage]) -> Watchful:
         """A step by the round's root where the network is whole, a Metropolis step where it is not."""
-        size = state.value.size
-        value = state.value.copy()
+        size = len(state.value)
+        value, said = np.array(state.value), np.array(own.payload[:size])
         for message in received:
             # a_l(t) = a_l(t-1) + Σ_j (a_j(t-1) - a_l(t-1)) / λ_t
             if own.round <= len(self.roots) and not (self._alarm(own, size) or self._alarm(message, size)):
                 weight = 1 / self.roots[own.round - 1]
             else:
                 weight = metropolis_weight(own.degree, message.degree)
-            value += weight * (message.payload[:size] - own.payload[:size])
+            value += weight * (np.array(message.payload[:size]) - said)
         # one round older, unless its cause repeats it
         heard = max((self._alarm(message, size) for message in (own, *received)), default=0)
         missing = len(received) < self.degrees[own.sender]
-        return Watchful(value, len(self.degrees) if missing else max(heard - 1, 0))
+        return Watchful(tuple(value.tolist()), len(self.degrees) if missing else max(heard - 1, 0))
 
     def _alarm(self, message: ConsensusMessage, size: int) -> int:
         """How many rounds a message's alarm still lives; N at the most, in which it reaches everybody."""
         n = len(self.degrees)
         if message.degree != self.degrees[message.sender]:
             return n
-        return int(np.clip(np.rint(message.payload[-1]), 0, n)) if message.payload.size > size else 0
+        return min(max(round(message.payload[-1]), 0), n) if len(message.payload) > size else 0
 
 
 def leja_order(points: Float[np.ndarray, " K"]) -> Float[np.ndarray, " K"]:

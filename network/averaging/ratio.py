@@ -32,9 +32,9 @@ class Masses(State):
         taken: What it has taken from each neighbour.
     """
 
-    mass: Float[np.ndarray, " K+1"]
-    given: Float[np.ndarray, " K+1"]
-    taken: Mapping[str, Float[np.ndarray, " K+1"]]
+    mass: Float[np.ndarray, " M"]
+    given: Float[np.ndarray, " M"]
+    taken: Mapping[str, Float[np.ndarray, " M"]]
 
 
 class Ratio(AlgorithmOptions):
@@ -56,20 +56,22 @@ class Ratio(AlgorithmOptions):
 
     def payload(self, state: Masses, degree: int) -> Vector:
         """All that each neighbour has been given, with this round's share."""
-        return state.given + state.mass / (degree + 1)
+        return tuple((state.given + state.mass / (degree + 1)).tolist())
 
     def fits(self, state: Masses, message: ConsensusMessage) -> bool:
         """Whether it is as long as the node's own, and its weight has not shrunk."""
         sums, taken = message.payload, state.taken.get(message.sender)
         least = 0.0 if taken is None else taken[-1]
-        return sums.shape == state.mass.shape and bool(sums[-1] >= least)
+        return len(sums) == len(state.mass) and bool(sums[-1] >= least)
 
     def step(self, state: Masses, own: ConsensusMessage, received: Sequence[ConsensusMessage]) -> Masses:
         """Gives this round's shares, and takes what the sums have grown by."""
-        mass = state.mass - own.degree * (own.payload - state.given)
+        given = np.array(own.payload)
+        mass = state.mass - own.degree * (given - state.given)
         taken = dict(state.taken)
         for message in received:
             # ρ_lj(t) = σ_j; what was lost on the way is in it
-            mass += message.payload - taken.get(message.sender, 0.0)
-            taken[message.sender] = message.payload
-        return Masses(mass[:-1] / mass[-1], mass, own.payload, taken)
+            sums = np.array(message.payload)
+            mass += sums - taken.get(message.sender, 0.0)
+            taken[message.sender] = sums
+        return Masses(tuple((mass[:-1] / mass[-1]).tolist()), mass, given, taken)

@@ -72,12 +72,16 @@ def fused(local: GaussianEstimate, answer: Information | Moments) -> Moments:
         The posteriors; a node whose answer is no density keeps its prediction.
     """
     if isinstance(answer, Information):
-        answer = to_moments(plus_on_position(local.before, answer))
-    sound = np.isfinite(answer.covariance).all(axis=(1, 2))
-    sound[sound] = np.linalg.eigvalsh(answer.covariance[sound])[:, 0] > 0
+        # NaN, where it is no density
+        posterior = to_moments(plus_on_position(local.before, answer))
+        sound = np.isfinite(posterior.covariance).all(axis=(1, 2))
+    else:
+        posterior = answer
+        sound = np.isfinite(posterior.covariance).all(axis=(1, 2))
+        sound[sound] = np.linalg.eigvalsh(posterior.covariance[sound])[:, 0] > 0
     return Moments(
-        np.where(sound[:, None], answer.mean, local.predicted.mean),
-        np.where(sound[:, None, None], answer.covariance, local.predicted.covariance),
+        np.where(sound[:, None], posterior.mean, local.predicted.mean),
+        np.where(sound[:, None, None], posterior.covariance, local.predicted.covariance),
     )
 
 

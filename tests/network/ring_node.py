@@ -3,6 +3,7 @@
 Usage: ring_node.py JSON, with run, name, names, directory, frames, iterations.
 """
 
+import itertools
 import json
 import os
 import signal
@@ -32,9 +33,11 @@ def rounds(transport, consensus, frame, value):
     for message in consensus.begin(frame, value):
         transport.send(message)
     while not consensus.done:
-        sender = consensus.waiting_for()[0]
-        message = transport.receive(sender, timeout_s=2.0)
-        for reply in consensus.drop(sender) if message is None else consensus.receive(message):
+        awaited = consensus.waiting_for()
+        messages = transport.receive_each(awaited, timeout_s=2.0)
+        replies = [consensus.receive(message) for message in messages]
+        replies += [consensus.drop(name) for name in set(awaited) - {message.sender for message in messages}]
+        for reply in itertools.chain(*replies):
             transport.send(reply)
 
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra import numpy as hnp
 
 from network import codec
 from network.errors import RefusedMessage
@@ -28,11 +27,11 @@ from network.quantization import Quantizer
 
 RUN = "scene1"
 finite = st.floats(-1e150, 1e150)
-payloads = hnp.arrays(float, st.integers(0, 40), elements=finite)
+payloads = st.lists(finite, max_size=40).map(tuple)
 
-CONSENSUS = ConsensusMessage("C1", 7, 3, 2, np.array([1.5, -2.0, 1e-300]))
-SINGLE = ConsensusMessage("C1", 7, 3, 2, np.array([1.5, -2.0, 0.25]), "float32")
-HALF = ConsensusMessage("C1", 7, 3, 2, np.array([1.5 * 2.0**30, -(2.0**31), 0.0]), "float16")
+CONSENSUS = ConsensusMessage("C1", 7, 3, 2, (1.5, -2.0, 1e-300))
+SINGLE = ConsensusMessage("C1", 7, 3, 2, (1.5, -2.0, 0.25), "float32")
+HALF = ConsensusMessage("C1", 7, 3, 2, (1.5 * 2.0**30, -(2.0**31), 0.0), "float16")
 PIXELS = PixelsMessage("C1", 7, np.arange(4 * 5 * 3, dtype=np.uint8).reshape(4, 5, 3))
 CONFIRM = ConfirmMessage("central", 7)
 ESTIMATE = EstimateMessage(
@@ -55,8 +54,7 @@ PUBLIC = [ESTIMATE, STATUS, TRUTH, CONTROL, ControlMessage("stop")]
 def test_consensus_round_trip(frame, round_, degree, payload):
     message = ConsensusMessage("C1", frame, round_, degree, payload)
     read = codec.decode(ConsensusMessage, RUN, "C1", codec.encode(RUN, message))
-    assert (read.sender, read.frame, read.round, read.degree) == ("C1", frame, round_, degree)
-    np.testing.assert_array_equal(read.payload, payload)
+    assert read == message
 
 
 def test_consensus_layout_as_documented():
@@ -77,15 +75,13 @@ def test_rounded_payloads_layout_as_documented():
 
 @pytest.mark.parametrize("encoding", ["float32", "float16"])
 @settings(deadline=None)
-@given(hnp.arrays(float, st.integers(0, 9), elements=st.floats(-1e37, 1e37)), st.integers(0, 2**32))
+@given(st.lists(st.floats(-1e37, 1e37), max_size=9).map(tuple), st.integers(0, 2**32))
 def test_rounded_payloads_round_trip_to_the_last_bit(encoding, payload, seed):
     for rng in (None, np.random.default_rng(seed)):
         sent = Quantizer(encoding, rng)(payload)
         message = ConsensusMessage("C1", 7, 3, 2, sent, encoding)
         read = codec.decode(ConsensusMessage, RUN, "C1", codec.encode(RUN, message))
-        assert read.encoding == encoding
-        np.testing.assert_array_equal(read.payload, sent)
-        assert not read.payload.flags.writeable
+        assert read == message
 
 
 @pytest.mark.parametrize(
@@ -254,7 +250,7 @@ def test_damaged_bytes_are_read_or_refused_and_nothing_else(data):
 
 def test_values_that_are_not_finite_are_our_own_mistake():
     with pytest.raises(ValueError, match="C1 has a value that is not finite in frame 7"):
-        codec.encode(RUN, ConsensusMessage("C1", 7, 3, 2, np.array([np.nan])))
+        codec.encode(RUN, ConsensusMessage("C1", 7, 3, 2, (np.nan,)))
     with pytest.raises(ValueError, match="not JSON compliant"):
         codec.encode(RUN, ControlMessage("start", float("inf")))
 

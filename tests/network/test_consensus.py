@@ -119,7 +119,7 @@ def test_the_paper_s_ring():
 
 
 def says(sender, frame, round_, *payload, degree=1):
-    return ConsensusMessage(sender, frame, round_, degree, np.array(payload, dtype=float))
+    return ConsensusMessage(sender, frame, round_, degree, tuple(map(float, payload)))
 
 
 def node(iterations=3, neighbors=("A", "B")):
@@ -340,5 +340,5 @@ def test_no_sequence_of_messages_breaks_a_node(data):
                 m.receive(says(sender, at, round_, *np.zeros(data.draw(st.sampled_from([2, 2, 2, 3])))))
         assert 0 <= m.rounds_done <= 3
         assert m.done == (not m.waiting_for())
-        assert len(m._inbox) <= 4
+        assert sum(map(len, m._inbox.values())) <= 4
         assert len(m._early) <= 2

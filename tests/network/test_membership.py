@@ -164,7 +164,7 @@ def test_who_is_behind_counts_by_its_own_frame_whatever_those_ahead_tell():
     node.drop("C")
     # C, which has been apart, is eight frames ahead, and tells of the link there
     number = sorted(net.edges).index(("B", "C"))
-    node.receive(ConsensusMessage("C", 9, 1, 0, np.array([0.0]), down=((number, 9),)))
+    node.receive(ConsensusMessage("C", 9, 1, 0, (0.0,), down=((number, 9),)))
     node.restore("C")
 
     node.begin(1, np.array([1.0]))

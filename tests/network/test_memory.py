@@ -17,7 +17,7 @@ def made():
 
 
 def says(sender, round_=1):
-    return ConsensusMessage(sender, 0, round_, 2, np.array([1.0, 2.0]))
+    return ConsensusMessage(sender, 0, round_, 2, (1.0, 2.0))
 
 
 def drain(net):

@@ -77,7 +77,7 @@ def estimate_of(node, estimator, frame):
 
 
 def says(sender, round_, *payload):
-    return ConsensusMessage(sender, 0, round_, 1, np.array(payload, dtype=float))
+    return ConsensusMessage(sender, 0, round_, 1, tuple(map(float, payload)))
 
 
 @contextlib.contextmanager
@@ -209,6 +209,20 @@ def test_receive_ends_in_time_and_keeps_order(pair):
     assert [a.receive("B", timeout_s=2.0).round for _ in range(2)] == [1, 2]
     assert b.counters.messages == {"consensus": 2}
     assert b.counters.bytes == {"consensus": 2 * (24 + 16)}
+
+
+def test_what_has_come_of_several_is_read_and_who_is_silent_or_refused_left_out(pair):
+    a, b = pair
+    b.send(says("B", 1, 1.0))
+    b._publishers[ConsensusMessage].put(b"rubbish")
+    b.send(says("B", 3, 1.0))
+    begin = time.monotonic()
+    assert [message.round for message in a.receive_each(("B", "B", "B"), timeout_s=2.0)] == [1, 3]
+    assert time.monotonic() - begin < 1.0
+    b.send(says("B", 4, 1.0))
+    begin = time.monotonic()
+    assert [message.round for message in a.receive_each(("B", "B", "B"), timeout_s=0.2)] == [4]
+    assert 0.2 <= time.monotonic() - begin < 1.0  # for all together
 
 
 def test_a_lost_neighbour_wakes_who_waits_for_it(pair):

@@ -22,14 +22,16 @@ from network.zenoh import ZenohTransport
 
 N_NUMBERS = 5
 """What the net information has on a plane."""
+ROUNDS = 12
+"""Rounds of a turn, as a frame has."""
 PATIENCE_S = 20.0
 
 
 class Exchange(Protocol):
     """A way to exchange messages."""
 
-    def rounds(self, count: int) -> None:
-        """Says something to all neighbours and hears all of them, so many times."""
+    def turn(self) -> None:
+        """Says something to all neighbours and hears all of them, `ROUNDS` times."""
 
 
 class ConsensusRounds:
@@ -49,20 +51,22 @@ class ConsensusRounds:
         self._transport = ZenohTransport(run, name, links, listen, connect, drop_late_pixels=False)
         self._transport.announce()
         self._transport.wait_until_alive(links.neighbors, PATIENCE_S)
-        self._name, self._graph, self._frame = name, graph, 0
+        self._consensus = Consensus(name, links.neighbors, MetropolisWeights().tuned(graph, ROUNDS), ROUNDS)
+        self._frame = 0
 
-    def rounds(self, count: int) -> None:
-        """A frame of so many rounds."""
-        algorithm = MetropolisWeights().tuned(self._graph, count)
-        consensus = Consensus(self._name, self._graph.neighbors(self._name), algorithm, count)
+    def turn(self) -> None:
+        """A frame."""
+        consensus = self._consensus
         for said in consensus.begin(self._frame, np.arange(N_NUMBERS, dtype=float)):
             self._transport.send(said)
         while waiting := consensus.waiting_for():
-            message = self._transport.receive(waiting[0], PATIENCE_S)
-            if not isinstance(message, ConsensusMessage):
-                raise TimeoutError(f"{self._name} heard nothing of {waiting[0]}")
-            for reply in consensus.receive(message):
-                self._transport.send(reply)
+            messages = self._transport.receive_each(waiting, PATIENCE_S)
+            if not messages:
+                raise TimeoutError(f"{consensus.name} heard nothing of {', '.join(waiting)}")
+            for message in messages:
+                if isinstance(message, ConsensusMessage):
+                    for reply in consensus.receive(message):
+                        self._transport.send(reply)
         self._frame += 1
 
     def close(self) -> None:
@@ -90,9 +94,9 @@ class BareZenoh:
         )
         self._data = _message(run, name)
 
-    def rounds(self, count: int) -> None:
+    def turn(self) -> None:
         """Puts and receives, and nothing else."""
-        for _ in range(count):
+        for _ in range(ROUNDS):
             self._publisher.put(self._data)
             for inbox in self._inboxes:
                 inbox.recv().payload.to_bytes()
@@ -109,8 +113,12 @@ class PlainSockets:
         """Ends of connected sockets, one for each neighbour."""
         self._ends, self._data = ends, _message(run, name)
 
-    def rounds(self, count: int) -> None:
+    def turn(self) -> None:
         """Sends and receives, and nothing else."""
+        self.rounds(ROUNDS)
+
+    def rounds(self, count: int) -> None:
+        """The same for any number of rounds."""
         for _ in range(count):
             for end in self._ends:
                 end.sendall(self._data)
@@ -128,7 +136,7 @@ def connected(graph: Graph) -> Mapping[str, Sequence[socket.socket]]:
 
 
 def _message(run: str, name: str) -> bytes:
-    return codec.encode(run, ConsensusMessage(name, 1, 1, 2, np.arange(N_NUMBERS, dtype=float)))
+    return codec.encode(run, ConsensusMessage(name, 1, 1, 2, tuple(map(float, range(N_NUMBERS)))))
 
 
 def _endpoints(name: str, graph: Graph, prefix: str) -> tuple[list[str], list[str]]:

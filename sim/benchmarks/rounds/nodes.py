@@ -7,15 +7,21 @@ import json
 import os
 import sys
 import time
+from collections import deque
 from statistics import median
 from typing import Any
 
 from network.graph import Graph
-from sim.benchmarks.rounds.exchange import BareZenoh, ConsensusRounds, Exchange, PlainSockets, connected
+from sim.benchmarks.rounds.exchange import (
+    ROUNDS,
+    BareZenoh,
+    ConsensusRounds,
+    Exchange,
+    PlainSockets,
+    connected,
+)
 from sim.scenario.model import GRAPHS
 
-ROUNDS = 12
-"""Rounds of a turn, as a frame has."""
 _RUN = "bench"
 
 
@@ -71,16 +77,18 @@ def _be_node(
     bare.close()
 
 
-def _timed(ways: dict[str, Exchange], barrier: Exchange, n_nodes: int, turns: int) -> dict[str, float]:
+def _timed(ways: dict[str, Exchange], barrier: PlainSockets, n_nodes: int, turns: int) -> dict[str, float]:
     """The median time of a round of each way, and the processor time of one of a run's rounds, in µs."""
     wall: dict[str, list[float]] = {name: [] for name in ways}
     cpu: list[float] = []
+    order = deque(ways.items())
     for turn in range(turns + 1):
-        for name, way in ways.items():
+        order.rotate()  # nobody is always the first
+        for name, way in order:
             # everybody begins a turn together: after as many rounds as nodes, all have heard of all
             barrier.rounds(n_nodes)
             began, processor = time.perf_counter(), time.process_time()
-            way.rounds(ROUNDS)
+            way.turn()
             if turn:  # the first warms up
                 wall[name].append((time.perf_counter() - began) / ROUNDS)
                 if name == "round_us":
