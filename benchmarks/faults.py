@@ -13,8 +13,8 @@ import numpy as np
 from sim.assembly import Assembly
 from sim.faults.pictures import with_faults
 from sim.metrics.errors import position_errors, rmse
+from sim.results.results import Results
 from sim.running.in_process import run_in_process
-from sim.running.results import Results
 from sim.scenario.loading import load_scenario
 
 PARTED, PARTED_FRAMES, PARTS = 20, 10, (("C1", "C2"), ("C3", "C4"))

@@ -13,7 +13,8 @@ import subprocess
 import sys
 import tempfile
 
-from network import keys, sessions
+from network.links import sessions
+from network.wire import keys
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("scenario", nargs="?", default="scenarios/scene1.yaml")

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import UInt8
 
-from network.messages import ConfirmMessage, EstimateMessage, PixelsMessage
-from nodes.estimator import SirEstimator
+from network.wire.messages import ConfirmMessage, EstimateMessage, PixelsMessage
+from nodes.estimators.estimator import SirEstimator
 from nodes.setup import TrackingSetup
 from nodes.vision.appearance import Appearance, pack_looks, settled, unpack_looks
 from nodes.vision.observation import ObservationModel

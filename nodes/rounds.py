@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from network.consensus import Consensus
-from network.messages import ConsensusMessage
-from network.transport import Loss
+from network.links.transport import Loss
+from network.rounds.consensus import Consensus
+from network.wire.messages import ConsensusMessage
 
 SILENT_ROUNDS = 12
 """Rounds in a row without a word of a neighbour after which it is gone: by 30% loss, one in a million."""

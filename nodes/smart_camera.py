@@ -10,22 +10,22 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from network.consensus import Consensus
-from network.messages import ConsensusMessage, EstimateMessage, PreviewMessage, StateMessage
-from network.transport import Loss
-from nodes.array_estimator import ArrayEstimator
-from nodes.estimator import SirEstimator
+from network.links.transport import Loss
+from network.rounds.consensus import Consensus
+from network.wire.messages import ConsensusMessage, EstimateMessage, PreviewMessage, StateMessage
+from nodes.estimators.array_estimator import ArrayEstimator
+from nodes.estimators.estimator import SirEstimator
 from nodes.filtering.fusion import fuse, is_density, left_of, pack, propagate, unpack
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.local import LocalResult, local_filter
 from nodes.filtering.particles import Particles, resample_if_degenerate
 from nodes.filtering.sighting import Sighting
 from nodes.frame import FrameInProgress, is_new
-from nodes.preview import preview
 from nodes.rounds import Rounds
 from nodes.setup import TrackingSetup
+from nodes.shell.preview import preview
+from nodes.shell.telemetry import Counters
 from nodes.simd.report import FrameReport
-from nodes.telemetry import Counters
 from nodes.vision.appearance import Appearance, pack_looks, settled, unpack_looks
 from nodes.vision.observation import ObservationModel, Picture
 

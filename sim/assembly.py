@@ -9,22 +9,22 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from network.averaging.algorithm import Algorithm
-from network.consensus import Consensus
-from network.graph import Graph
-from network.membership import Membership
-from network.messages import TruthMessage, Visibility
+from network.graphs.graph import Graph
+from network.links.transport import Links, links_of
+from network.rounds.consensus import Consensus
+from network.rounds.membership import Membership
 from network.streams import stream
-from network.transport import Links, links_of
-from nodes.array_estimator import ArrayEstimator
-from nodes.camera import Camera
+from network.wire.messages import TruthMessage, Visibility
 from nodes.central import Central
 from nodes.counting.build import load_kernel
-from nodes.estimator import SirEstimator
-from nodes.pace import Pace
+from nodes.estimators.array_estimator import ArrayEstimator
+from nodes.estimators.estimator import SirEstimator
+from nodes.imaging.camera import Camera
+from nodes.imaging.sources import FrameSource
 from nodes.setup import Start, TrackingSetup
+from nodes.shell.pace import Pace
 from nodes.simd.likelihood import SimdLikelihood
 from nodes.smart_camera import SmartCamera
-from nodes.sources import FrameSource
 from nodes.vision.observation import ObservationModel
 from sim.faults.pictures import with_faults
 from sim.scenario.loading import cameras_of, video_source

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from nodes.camera import Camera
 from nodes.filtering.motion import DynamicsOptions
+from nodes.imaging.camera import Camera
 from nodes.vision.target import TargetOptions
 from sim.footage.ground_truth import read_ground_truth
 from sim.scenario.model import FootageOptions

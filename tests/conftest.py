@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from nodes.camera import look_at
 from nodes.filtering.fusion import FusionOptions
+from nodes.imaging.camera import look_at
 from nodes.setup import FilterOptions, Start, TrackingSetup
 from nodes.vision.color import ColorOptions
 from nodes.vision.observation import ObservationModel

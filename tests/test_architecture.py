@@ -22,23 +22,11 @@ PURE = (
     *sorted((ROOT / "sim/metrics").glob("*.py")),
     *(ROOT / "sim/simulation" / name for name in ("gaussians.py", "sensor.py", "simulation.py")),
     ROOT / "sim/scenario/cameras.py",
-    *sorted((ROOT / "network/averaging").glob("*.py")),
     *sorted((ROOT / "nodes/simd").rglob("*.py")),
-    *(
-        ROOT / "nodes" / name
-        for name in (
-            "array_estimator.py",
-            "camera.py",
-            "central.py",
-            "estimator.py",
-            "frame.py",
-            "pace.py",
-            "preview.py",
-            "rounds.py",
-            "setup.py",
-            "smart_camera.py",
-        )
-    ),
+    *sorted((ROOT / "nodes/estimators").glob("*.py")),
+    *(ROOT / "nodes" / name for name in ("central.py", "frame.py", "rounds.py", "setup.py")),
+    *(ROOT / "nodes" / name for name in ("smart_camera.py", "imaging/camera.py")),
+    *(ROOT / "nodes/shell" / name for name in ("pace.py", "preview.py")),
     *(
         ROOT / "sim" / name
         for name in (
@@ -50,24 +38,12 @@ PURE = (
         )
     ),
     *(
-        ROOT / "network" / name
-        for name in (
-            *("codec.py", "conditions.py", "consensus.py", "errors.py", "graph.py", "header.py"),
-            *("jpeg.py", "keys.py"),
-            *(
-                "membership.py",
-                "memory.py",
-                "messages.py",
-                "options.py",
-                "quantization.py",
-                "random_graphs.py",
-                "laplacian.py",
-                "spectrum.py",
-                "streams.py",
-                "weights.py",
-            ),
-        )
+        path
+        for folder in ("averaging", "graphs", "rounds", "wire")
+        for path in sorted((ROOT / "network" / folder).glob("*.py"))
     ),
+    *(ROOT / "network" / name for name in ("errors.py", "options.py", "streams.py")),
+    *(ROOT / "network/links" / name for name in ("conditions.py", "memory.py")),
 )
 """Mathematics and state machines: the same arguments give the same results, always."""
 

@@ -11,9 +11,9 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from extension.schema import one_line, type_text
-from network import codec, keys
-from network.codec import encode
-from network.messages import (
+from network.wire import codec, keys
+from network.wire.codec import encode
+from network.wire.messages import (
     ConfirmMessage,
     ConsensusMessage,
     ControlMessage,
@@ -24,7 +24,7 @@ from network.messages import (
     TruthMessage,
     Visibility,
 )
-from network.quantization import Encoding
+from network.wire.quantization import Encoding
 
 EXAMPLES: tuple[PublicMessage, ...] = (
     EstimateMessage(

@@ -2,7 +2,7 @@
 
 An algorithm is a frozen value, the same in all nodes, of pure functions: it knows no neighbour that a message
 does not name and no network but the one it was tuned to. Rounds, deadlines and who takes part are the affair
-of `network.consensus`. What an algorithm sends may be rounded on its way: in a step, a node's own message
+of `network.rounds`. What an algorithm sends may be rounded on its way: in a step, a node's own message
 stands for its state as the others know it, so that both ends of a link move by the same amount.
 """
 
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
-from network.graph import Graph
-from network.messages import ConsensusMessage
+from network.graphs.graph import Graph
 from network.options import Options
+from network.wire.messages import ConsensusMessage
 
 Vector = tuple[float, ...]
 """Numbers as messages carry them; of a handful, sums take half the time that they take as arrays."""

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 from network.averaging.algorithm import Algorithm, AlgorithmOptions
 from network.averaging.constant import ConstantWeights
-from network.graph import Graph
-from network.spectrum import extremes_of
+from network.graphs.graph import Graph
+from network.graphs.spectrum import extremes_of
 
 
 class BestConstant(AlgorithmOptions):

@@ -20,9 +20,9 @@ import numpy as np
 from jaxtyping import Float
 
 from network.averaging.algorithm import Algorithm, AlgorithmOptions, State, Vector
-from network.graph import Graph
-from network.messages import ConsensusMessage
-from network.spectrum import Spectrum, extremes_of
+from network.graphs.graph import Graph
+from network.graphs.spectrum import Spectrum, extremes_of
+from network.wire.messages import ConsensusMessage
 
 
 class Chebyshev(AlgorithmOptions):

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from network.averaging.algorithm import Algorithm, AlgorithmOptions, State, Vector
-from network.graph import Graph
-from network.messages import ConsensusMessage
+from network.graphs.graph import Graph
+from network.wire.messages import ConsensusMessage
 
 
 class Weights(AlgorithmOptions):

@@ -24,8 +24,8 @@ from jaxtyping import Float
 from pydantic import Field
 
 from network.averaging.algorithm import Algorithm, AlgorithmOptions, State, Vector, metropolis_weight
-from network.graph import Graph
-from network.messages import ConsensusMessage
+from network.graphs.graph import Graph
+from network.wire.messages import ConsensusMessage
 
 _REST = 2.0
 """Thresholds by which the ends of a link that rests may differ."""

@@ -20,9 +20,9 @@ import numpy as np
 from jaxtyping import Float
 
 from network.averaging.algorithm import Algorithm, AlgorithmOptions, State, Vector, metropolis_weight
-from network.graph import Graph
-from network.messages import ConsensusMessage
-from network.spectrum import spectrum_of
+from network.graphs.graph import Graph
+from network.graphs.spectrum import spectrum_of
+from network.wire.messages import ConsensusMessage
 
 
 class FiniteTime(AlgorithmOptions):

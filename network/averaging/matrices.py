@@ -18,10 +18,10 @@ from scipy import sparse
 from network.averaging.algorithm import metropolis_weight
 from network.averaging.chebyshev import next_relaxation
 from network.averaging.finite_time import leja_order
-from network.graph import Graph
-from network.laplacian import laplacian
-from network.spectrum import Spectrum, extremes_of, spectrum_of
-from network.weights import ConsensusOptions
+from network.averaging.weights import ConsensusOptions
+from network.graphs.graph import Graph
+from network.graphs.laplacian import laplacian
+from network.graphs.spectrum import Spectrum, extremes_of, spectrum_of
 
 Rounds = Iterator[Float[np.ndarray, "C K"]]
 """The values before the first round, after it, after the second, without end."""

@@ -18,8 +18,8 @@ import numpy as np
 from jaxtyping import Float
 
 from network.averaging.algorithm import Algorithm, AlgorithmOptions, State, Vector
-from network.graph import Graph
-from network.messages import ConsensusMessage
+from network.graphs.graph import Graph
+from network.wire.messages import ConsensusMessage
 
 
 @dataclass(frozen=True, slots=True, eq=False)

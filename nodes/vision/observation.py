@@ -12,10 +12,10 @@ from jaxtyping import Float, Int, UInt8
 from pydantic import Field
 
 from network.options import Options
-from nodes.camera import Camera
 from nodes.counting.codebook import Codebook
 from nodes.counting.compiled import distances_compiled
 from nodes.counting.histogram import SamplingOptions, locate
+from nodes.imaging.camera import Camera
 from nodes.simd.likelihood import SimdLikelihood
 from nodes.simd.options import SimdOptions
 from nodes.threads import in_shares

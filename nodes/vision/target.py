@@ -8,7 +8,7 @@ from jaxtyping import Float
 from pydantic import Field, PositiveFloat, model_validator
 
 from network.options import Options
-from nodes.camera import Camera
+from nodes.imaging.camera import Camera
 
 MIN_ASPECT = 0.8
 """Least height of a box in widths: what is left of a person seen from straight above."""

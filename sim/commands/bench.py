@@ -17,7 +17,7 @@ from sim.benchmarks.settings import SCENARIOS
 from sim.commands.bench_consensus import consensus
 from sim.commands.guard import guarded
 from sim.commands.shared import AsJson, progress_bar
-from sim.running.recorder import RecordingError
+from sim.results.recorder import RecordingError
 
 bench = typer.Typer(
     name="bench",

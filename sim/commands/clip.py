@@ -9,7 +9,7 @@ from rich.console import Console
 
 from sim.assembly import Assembly
 from sim.commands.shared import progress_bar
-from sim.running.recorder import RecordingError, read_run
+from sim.results.recorder import RecordingError, read_run
 
 
 def clip(

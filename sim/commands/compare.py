@@ -26,8 +26,8 @@ from sim.experiments.found.claims import Verdict
 from sim.experiments.options import ExperimentOptions, StudyOptions, is_experiment
 from sim.experiments.plan import Plan, make_plan, plan_experiment
 from sim.experiments.sweeps import parse_sweep
-from sim.running.recorder import RecordingError
-from sim.running.results import length
+from sim.results.recorder import RecordingError
+from sim.results.results import length
 from sim.scenario.document import read_document
 from sim.scenario.parsing import ScenarioError
 

@@ -10,14 +10,14 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from network.spectrum import spectrum_of
+from network.graphs.spectrum import spectrum_of
 from sim.commands.shared import AsJson, Overrides, ScenarioPath, Seed, progress_bar, read_scenario
-from sim.running.recorder import RecordingError
+from sim.results.recorder import RecordingError
 from sim.scenario.model import Scenario
 from sim.scenario.parsing import ScenarioError
 
 if TYPE_CHECKING:
-    from sim.running.convergence import Convergence
+    from sim.results.convergence import Convergence
 
 
 def consensus(
@@ -39,7 +39,7 @@ def consensus(
 ) -> None:
     """Compare averaging algorithms on a scenario's graph: convergence against theory, and bytes."""
     # SciPy takes its time to import, and only this needs it.
-    from sim.running.convergence import ALGORITHMS, converge
+    from sim.results.convergence import ALGORITHMS, converge
 
     chosen = tuple(dict.fromkeys(algorithm or ALGORITHMS))
     for name in chosen:

@@ -11,11 +11,11 @@ from rich.console import Console
 
 from network.errors import NetworkError
 from nodes.counting.build import KernelError
-from nodes.sources import SourceError
+from nodes.imaging.sources import SourceError
 from sim.experiments.computing.errors import EngineError
 from sim.footage import FootageError
+from sim.results.recorder import RecordingError
 from sim.running.children import RunFailed
-from sim.running.recorder import RecordingError
 from sim.scenario.parsing import ScenarioError
 
 USERS_ERRORS = (

@@ -11,7 +11,7 @@ from sim.assembly import Assembly
 from sim.commands.live import DEFAULT_PORT, LOOPBACK, Bind, Live, Port, page, say
 from sim.commands.shared import progress_bar
 from sim.replay.playback import MAX_SPEED, Playback
-from sim.running.recorder import RecordingError
+from sim.results.recorder import RecordingError
 
 
 def replay(

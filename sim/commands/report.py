@@ -10,9 +10,9 @@ from rich.console import Console
 
 from sim.assembly import Assembly
 from sim.commands.shared import progress_bar
-from sim.running.provenance import sent_per_frame
-from sim.running.recorder import FILM, RecordingError, as_run, expected_tracks, read_run, read_summary
-from sim.running.results import Results, summarize
+from sim.results.provenance import sent_per_frame
+from sim.results.recorder import FILM, RecordingError, as_run, expected_tracks, read_run, read_summary
+from sim.results.results import Results, summarize
 from sim.scenario.document import as_yaml
 
 

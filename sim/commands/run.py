@@ -27,10 +27,10 @@ from sim.commands.shared import (
     tell_advice,
     yes_no,
 )
+from sim.results.provenance import sent_per_frame, versions
+from sim.results.recorder import Film, Recorder, default_folder
+from sim.results.results import Results, length, summarize
 from sim.running.in_process import run_in_process
-from sim.running.provenance import sent_per_frame, versions
-from sim.running.recorder import Film, Recorder, default_folder
-from sim.running.results import Results, length, summarize
 from sim.scenario.model import Scenario
 
 

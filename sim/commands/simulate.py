@@ -24,7 +24,7 @@ from sim.commands.shared import (
     progress_bar,
     read_scenario,
 )
-from sim.running.recorder import RecordingError
+from sim.results.recorder import RecordingError
 
 
 def simulate(

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from network.messages import EstimateMessage
+from network.wire.messages import EstimateMessage
 from sim.commands.shared import AsJson
 
 
@@ -25,7 +25,7 @@ def watch(
 
     found = estimates(key, connect)
     if as_json or not sys.stdout.isatty():
-        from network.codec import encode_public
+        from network.wire.codec import encode_public
 
         for message in found:
             if message is not None:

@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, PositiveInt, model_validator
 
-from network.keys import check_name
 from network.options import Options
+from network.wire.keys import check_name
 from sim.scenario.complaints import validate
 from sim.scenario.document import Document
 from sim.scenario.presets import PresetName

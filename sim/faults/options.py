@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, PositiveInt
 
-from network.keys import check_name
 from network.options import Options
+from network.wire.keys import check_name
 
 Name = Annotated[str, AfterValidator(check_name)]
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import UInt8
 
-from nodes.camera import Camera
-from nodes.sources import FrameSource
+from nodes.imaging.camera import Camera
+from nodes.imaging.sources import FrameSource
 from sim.faults.options import BlackOptions, FaultOptions, MiscalibrateOptions, PictureFault
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import UInt8
 
-from nodes.sources import FrameSource
+from nodes.imaging.sources import FrameSource
 from sim.faults.options import FaultOptions
 from sim.faults.schedule import absences, slowness_s
 

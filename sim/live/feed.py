@@ -5,7 +5,8 @@ from collections.abc import Callable
 
 import zenoh
 
-from network import keys, sessions
+from network.links import sessions
+from network.wire import keys
 
 LEAVE_S = 6.0
 """A session has five seconds to close."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from network.messages import StatusMessage
+from network.wire.messages import StatusMessage
 
 State = Literal["waiting", "alive", "lost", "done", "failed"]
 """Not heard of yet; there; gone without a goodbye; at its end; left before the end."""

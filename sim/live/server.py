@@ -15,9 +15,9 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from network import codec, keys
 from network.errors import NetworkError, RefusedMessage
-from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
+from network.wire import codec, keys
+from network.wire.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from sim.live.feed import Feed
 from sim.live.pages import answer
 from sim.live.story import Event, Story

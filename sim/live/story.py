@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
+from network.wire.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from nodes.vision.target import project_boxes
 from sim.assembly import Assembly
 from sim.live.nodes import NodeStates
 from sim.live.setting import setting
 from sim.pictures.ground import ellipse
 from sim.recording.scene import in_world
-from sim.running.recorder import expected_tracks
-from sim.running.results import Track
+from sim.results.recorder import expected_tracks
+from sim.results.results import Track
 
 Event = dict[str, Any]
 

@@ -18,7 +18,7 @@ from sim.pictures.ground_map import GroundMap
 from sim.pictures.mp4 import require_ffmpeg, write_mp4
 from sim.pictures.overlay import Shown, draw_frame, text_size
 from sim.pictures.theme import COLORS, FAINT, LABELS
-from sim.running.results import Results
+from sim.results.results import Results
 
 FORMATS: Mapping[str, tuple[int, ...]] = {
     ".webp": (cv2.IMWRITE_WEBP_QUALITY, 80),  # below, still walls flicker in patches

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from sim.pictures.plots import cleaned, log_axis
 from sim.pictures.theme import COLORS, LABELS, MUTED
-from sim.running.results import length
+from sim.results.results import length
 
 _PLACES = {"dcpf": -0.26, "cpf": 0.0, "single": 0.26}  # of the strips beside a scenario's name
 _BEST_SINGLE = "best single camera"

@@ -11,7 +11,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from sim.pictures.plots import cleaned
 from sim.pictures.theme import INK, MUTED
-from sim.running.convergence import EXACT, Convergence
+from sim.results.convergence import EXACT, Convergence
 
 _LOOKS = {
     "constant": ("#000000", "s"),

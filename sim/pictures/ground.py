@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Int
 
-from nodes.camera import Camera
+from nodes.imaging.camera import Camera
 from sim.assembly import Assembly
-from sim.running.results import Results
+from sim.results.results import Results
 
 _MARGIN = 0.08  # of the larger side, around what must be seen
 _RIM_STEPS = 16  # corners along each side of a picture, whose rim a lens may bend

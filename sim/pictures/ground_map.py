@@ -21,7 +21,7 @@ from sim.pictures.chart import Chart, Line, mean_known, round_numbers
 from sim.pictures.ground import area_of, coverage, ellipse, heading, height_of_target
 from sim.pictures.overlay import text_size
 from sim.pictures.theme import COLORS, INK, LABELS, MUTED, PAPER, SEEN
-from sim.running.results import Results, Track
+from sim.results.results import Results, Track
 from sim.world.colors import bgr
 
 _HEIGHT_SHARE = 0.24  # of the picture, for the strip that shows the height in a volume

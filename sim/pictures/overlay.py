@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float
 
-from nodes.camera import Camera
+from nodes.imaging.camera import Camera
 from nodes.vision.target import TargetOptions, project_boxes, visible_fraction
 from sim.pictures.canvas import Image, blank, dashes, draw_dots, draw_lines, draw_text, text_width
 from sim.pictures.theme import COLORS, INK, LABELS, PAPER

@@ -16,7 +16,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from sim.assembly import Assembly
 from sim.pictures.ground import Area, area_of, coverage, heading, height_of_target
 from sim.pictures.theme import COLORS, FAINT, INK, LABELS, MUTED, SEEN
-from sim.running.results import Results
+from sim.results.results import Results
 
 _GRID_CELLS = 300  # along the longer side of the ground, for who sees what
 

@@ -23,8 +23,8 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.schema import register_schema
 
-from network import codec, keys
-from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
+from network.wire import codec, keys
+from network.wire.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from nodes.vision.target import project_boxes
 from sim.assembly import Assembly
 from sim.pictures.theme import COLORS, PAPER, PARTICLE

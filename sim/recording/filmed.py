@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from network import codec, keys
 from network.errors import RefusedMessage
-from network.messages import EstimateMessage, StatusMessage, TruthMessage
-from nodes.sources import FrameSource, SourceError
+from network.wire import codec, keys
+from network.wire.messages import EstimateMessage, StatusMessage, TruthMessage
+from nodes.imaging.sources import FrameSource, SourceError
 from sim.assembly import Assembly
 from sim.recording.reader import McapRecording
-from sim.running.results import Results
+from sim.results.results import Results
 
 
 def results_of(recording: McapRecording) -> Results:

@@ -23,7 +23,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 from jaxtyping import Float
 
-from nodes.camera import Camera
+from nodes.imaging.camera import Camera
 from sim.world.colors import bgr
 
 WORLD = "world"

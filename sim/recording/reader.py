@@ -8,12 +8,12 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from mcap.exceptions import McapError
 from mcap.reader import McapReader, make_reader
 
-from network import keys
-from network.messages import EstimateMessage, StatusMessage, TruthMessage
+from network.wire import keys
+from network.wire.messages import EstimateMessage, StatusMessage, TruthMessage
 from sim.recording.film import SCENARIO
 from sim.recording.foxglove import to_ns
 from sim.recording.recovery import open_whole
-from sim.running.recorder import RecordingError
+from sim.results.recorder import RecordingError
 from sim.scenario.model import Scenario
 
 _PLAYED = frozenset(kind.kind for kind in (EstimateMessage, StatusMessage, TruthMessage))

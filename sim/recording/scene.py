@@ -20,7 +20,7 @@ from foxglove_schemas_protobuf.TextPrimitive_pb2 import TextPrimitive
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from jaxtyping import Float
 
-from network.messages import EstimateMessage, TruthMessage
+from network.wire.messages import EstimateMessage, TruthMessage
 from nodes.vision.target import TargetOptions
 from sim.assembly import Assembly
 from sim.pictures.ground import ellipse, field_of_view

@@ -4,7 +4,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from network.messages import EstimateMessage, StatusMessage, TruthMessage
+from network.wire.messages import EstimateMessage, StatusMessage, TruthMessage
 
 ALIVE_SCHEMA: dict[str, Any] = {
     "title": "dcpf.alive.v1",

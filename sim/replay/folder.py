@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from network import codec, keys
-from network.messages import PreviewMessage
-from nodes.preview import encode_jpeg
-from nodes.sources import FrameSource
+from network.wire import codec, keys
+from network.wire.messages import PreviewMessage
+from nodes.imaging.sources import FrameSource
+from nodes.shell.preview import encode_jpeg
 from sim.assembly import Assembly
-from sim.running.recorder import ESTIMATORS, read_run
+from sim.results.recorder import ESTIMATORS, read_run
 
 
 class FolderRecording:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from sim.recording.reader import McapRecording
 from sim.replay.folder import FolderRecording
-from sim.running.recorder import FILM, RecordingError
+from sim.results.recorder import FILM, RecordingError
 
 
 def film_of(path: Path) -> Path:

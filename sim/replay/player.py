@@ -10,11 +10,12 @@ from typing import Any, Protocol, runtime_checkable
 
 import zenoh
 
-from network import keys, sessions
-from network.messages import PreviewMessage
-from network.zenoh import has_listeners, publish_again
+from network.links import sessions
+from network.links.zenoh import has_listeners, publish_again
+from network.wire import keys
+from network.wire.messages import PreviewMessage
 from sim.replay.playback import Playback
-from sim.running.recorder import expected_tracks
+from sim.results.recorder import expected_tracks
 from sim.scenario.model import Scenario
 
 LISTENERS_S = 1.0

@@ -17,8 +17,8 @@ from sim.report.elements import ExperimentReport, Plot, StudyReport, Table
 from sim.report.figures import plot_world
 from sim.report.one_run import plainest, shown_runs
 from sim.report.svg import inline
-from sim.running.provenance import versions
-from sim.running.results import Results
+from sim.results.provenance import versions
+from sim.results.results import Results
 
 _CAPTIONS: Mapping[str, str] = {
     "error": "mean over the runs, in bands or bars of 95% confidence",

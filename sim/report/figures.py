@@ -16,7 +16,7 @@ from sim.assembly import Assembly
 from sim.pictures.ground import Area, area_of, field_of_view, height_of_target
 from sim.pictures.plots import cleaned, draw_ground, draw_heights, draw_paths
 from sim.pictures.theme import COLORS, MUTED, SEEN
-from sim.running.results import Results
+from sim.results.results import Results
 
 WIDTH_IN = 5.4
 """Of a figure: on a telephone its text can still be read."""

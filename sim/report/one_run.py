@@ -4,15 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from network.messages import PreviewMessage
+from network.wire.messages import PreviewMessage
 from sim.assembly import Assembly
 from sim.experiments.found.findings import Findings, GroupFindings
 from sim.report.elements import ShownRun
 from sim.report.run_tables import links_table
 from sim.report.stills import drawn_in, moments_by, moments_of
+from sim.results.provenance import sent_per_frame
+from sim.results.results import Results, summarize
 from sim.running.in_process import run_in_process
-from sim.running.provenance import sent_per_frame
-from sim.running.results import Results, summarize
 
 LIMIT_BYTES = 1_000_000
 """All pictures of an experiment's page together; its figures need more room than a run's."""

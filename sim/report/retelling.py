@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from network import codec
 from network.errors import RefusedMessage
-from network.messages import EstimateMessage, PreviewMessage
+from network.wire import codec
+from network.wire.messages import EstimateMessage, PreviewMessage
 from sim.assembly import Assembly
 from sim.recording.reader import McapRecording
+from sim.results.results import Results
 from sim.running.in_process import run_in_process
-from sim.running.results import Results
 
 Previews = Mapping[int, Mapping[str, PreviewMessage]]
 """By frame and camera."""

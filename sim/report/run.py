@@ -18,8 +18,8 @@ from sim.report.retelling import filmed, told_again
 from sim.report.run_tables import figures_table, links_table, timing_table
 from sim.report.stills import choose_moments, drawn_in, moments_of
 from sim.report.svg import inline
-from sim.running.convergence import converge
-from sim.running.results import Results
+from sim.results.convergence import converge
+from sim.results.results import Results
 from sim.scenario.model import SPACES
 
 _ERRORS_IN = 3.6

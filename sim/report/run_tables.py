@@ -6,7 +6,7 @@ from typing import Any
 from sim.assembly import Assembly
 from sim.metrics.consistency import anees_band
 from sim.report.elements import Table
-from sim.running.results import Results, length
+from sim.results.results import Results, length
 
 ABSENT = "–"
 

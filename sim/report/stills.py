@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float
 
-from network.messages import EstimateMessage, PreviewMessage
-from nodes.camera import Camera
+from network.wire.messages import EstimateMessage, PreviewMessage
+from nodes.imaging.camera import Camera
 from nodes.vision.target import TargetOptions
 from sim.assembly import Assembly
 from sim.pictures.canvas import Image, draw_dots, draw_lines
@@ -22,7 +22,7 @@ from sim.pictures.theme import COLORS, LABELS, PAPER, PARTICLE
 from sim.recording.scene import in_world
 from sim.report.elements import Moment, Still
 from sim.report.retelling import Previews
-from sim.running.results import Results
+from sim.results.results import Results
 from sim.world.colors import bgr
 
 WIDTH_PX = 480

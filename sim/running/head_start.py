@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 
-from network.runtime import RUNTIME_ENVIRONMENT
+from network.links.runtime import RUNTIME_ENVIRONMENT
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 

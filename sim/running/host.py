@@ -24,9 +24,9 @@ from pathlib import Path
 import cv2
 import zenoh
 
-from network import sessions
 from network.errors import NetworkError
-from nodes.sources import SourceError
+from network.links import sessions
+from nodes.imaging.sources import SourceError
 from sim.assembly import Assembly
 from sim.faults.schedule import absences
 from sim.running.endpoints import Endpoints, run_endpoints

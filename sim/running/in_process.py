@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import UInt8
 from threadpoolctl import threadpool_limits
 
-from network.conditions import NS
-from network.memory import MemoryNetwork
-from network.messages import (
+from network.links.conditions import NS
+from network.links.memory import MemoryNetwork
+from network.wire.messages import (
     ConsensusMessage,
     EstimateMessage,
     Message,
@@ -25,9 +25,9 @@ from network.messages import (
     TruthMessage,
 )
 from nodes.central import Central
+from nodes.imaging.sources import FrameSource
+from nodes.shell.telemetry import State, Telemetry
 from nodes.smart_camera import SmartCamera
-from nodes.sources import FrameSource
-from nodes.telemetry import State, Telemetry
 from sim.assembly import Assembly
 from sim.faults.schedule import Absence, absences, slowness_s
 

@@ -10,16 +10,17 @@ from pathlib import Path
 
 import zenoh
 
-from network import codec, keys, sessions
 from network.errors import RefusedMessage
-from network.messages import ControlMessage, EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
-from network.zenoh import publish
+from network.links import sessions
+from network.links.zenoh import publish
+from network.wire import codec, keys
+from network.wire.messages import ControlMessage, EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from sim.assembly import Assembly
 from sim.faults.orders import Orders
+from sim.results.recorder import Recorder, expected_tracks
+from sim.results.results import Results
 from sim.running.children import Children, RunFailed
 from sim.running.endpoints import run_endpoints
-from sim.running.recorder import Recorder, expected_tracks
-from sim.running.results import Results
 
 _log = logging.getLogger(__name__)
 START_LIMIT_S = 60.0

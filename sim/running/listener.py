@@ -8,9 +8,10 @@ from collections.abc import Iterator
 
 import zenoh
 
-from network import codec, sessions
 from network.errors import NetworkError, RefusedMessage
-from network.messages import EstimateMessage
+from network.links import sessions
+from network.wire import codec
+from network.wire.messages import EstimateMessage
 
 REFRESH_S = 0.1
 

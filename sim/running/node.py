@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import cv2
 from threadpoolctl import threadpool_limits
 
-from network.conditions import Channel
-from network.disturbed import DisturbedTransport
-from network.transport import Transport
-from network.zenoh import ZenohTransport
-from nodes.process import Shell, run_camera, run_central
+from network.links.conditions import Channel
+from network.links.disturbed import DisturbedTransport
+from network.links.transport import Transport
+from network.links.zenoh import ZenohTransport
+from nodes.shell.process import Shell, run_camera, run_central
 from sim.assembly import Assembly
 from sim.faults.process import FailingProcess
 from sim.scenario.parsing import ScenarioError

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import AfterValidator, Field, PositiveInt, model_validator
 
-from network.keys import check_name
 from network.options import Options
 from network.streams import stream
+from network.wire.keys import check_name
 
 Name = Annotated[str, AfterValidator(check_name)]
 Vector3 = tuple[float, float, float]

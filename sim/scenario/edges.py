@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from nodes.camera import Camera
+from nodes.imaging.camera import Camera
 from sim.scenario.graph_files import read_graph
 from sim.scenario.graphs import (
     FileGraph,

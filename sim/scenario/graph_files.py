@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from xml.etree.ElementTree import ParseError
 
-from network.graph import Graph
+from network.graphs.graph import Graph
 from sim.scenario.parsing import ScenarioError
 
 ENDINGS = (".graphml", ".gml", ".gexf", ".net", ".json", ".adjlist", ".edgelist")

@@ -11,11 +11,11 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import Field
 
-from network.graph import Edge, Graph
+from network.graphs.graph import Edge, Graph
+from network.graphs.random_graphs import geometric, watts_strogatz
 from network.options import Options
-from network.random_graphs import geometric, watts_strogatz
 from network.streams import stream
-from nodes.camera import Camera
+from nodes.imaging.camera import Camera
 
 
 class GeometricGraph(Options):

@@ -6,9 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from nodes.calibration import CalibrationError, checked_camera, cropped, read_opencv, read_qualisys, scaled
-from nodes.camera import Camera, look_at
-from nodes.sources import SourceError, VideoSource
+from nodes.imaging.calibration import (
+    CalibrationError,
+    checked_camera,
+    cropped,
+    read_opencv,
+    read_qualisys,
+    scaled,
+)
+from nodes.imaging.camera import Camera, look_at
+from nodes.imaging.sources import SourceError, VideoSource
 from sim.footage import FootageError, locate
 from sim.scenario.cameras import CameraOptions
 from sim.scenario.complaints import validate

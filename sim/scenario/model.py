@@ -6,14 +6,14 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from network.conditions import ConditionsOptions
-from network.graph import Edge, Graph, complete, grid, path, ring, star
+from network.averaging.weights import ConsensusOptions
+from network.graphs.graph import Edge, Graph, complete, grid, path, ring, star
+from network.links.conditions import ConditionsOptions
 from network.options import Options
-from network.quantization import PayloadOptions
-from network.weights import ConsensusOptions
+from network.wire.quantization import PayloadOptions
 from nodes.filtering.fusion import FusionOptions
-from nodes.pace import lag_for
 from nodes.setup import FilterOptions
+from nodes.shell.pace import lag_for
 from nodes.vision.target import TargetOptions
 from sim.faults.options import FaultOptions, require_possible
 from sim.scenario.cameras import Cameras, Name

@@ -15,8 +15,8 @@ from jaxtyping import Bool, Float
 from pydantic import Field
 
 from network.options import Options
-from nodes.camera import Camera
 from nodes.filtering.gaussian import Information
+from nodes.imaging.camera import Camera
 
 
 class SensorOptions(Options):

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from nodes.camera import Camera
+from nodes.imaging.camera import Camera
 from sim.world.floor import CEILING_TEXEL_M, FLOOR_TEXEL_M
 from sim.world.interior import Interior
 from sim.world.room import RoomOptions, along_wall, distance_to_wall, inside

@@ -9,7 +9,7 @@ from pydantic import Field, field_validator
 
 from network.options import Options
 from network.streams import stream
-from nodes.camera import Camera
+from nodes.imaging.camera import Camera
 from sim.world.curves import Curve, curve, require_increasing
 
 _NEUTRAL_K = 6500.0

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from nodes.camera import Camera
+from nodes.imaging.camera import Camera
 
 _NEAREST_M = 0.1  # faces closer than this to a camera's plane are not drawn
 _FARTHEST_PX = 20_000.0  # nor are those that end farther than this from the picture's corner

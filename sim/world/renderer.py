@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from nodes.camera import Camera
+from nodes.imaging.camera import Camera
 from sim.world.background import empty_room
 from sim.world.figure import figures
 from sim.world.light import Sensor, gain_at

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from nodes.camera import Camera
+from nodes.imaging.camera import Camera
 from sim.world.mesh import Box, box_around, fill
 
 PERSON_RADIUS = 0.30

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from nodes.camera import Camera
+from nodes.imaging.camera import Camera
 from sim.world.figure import figures, heads
 from sim.world.mesh import Solids, View, clip, is_empty, silhouette, views
 from sim.world.world import Part, World

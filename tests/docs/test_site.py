@@ -6,12 +6,11 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
-import numpy as np
 import pytest
 import typer
 
-from network.codec import encode
-from network.messages import ConsensusMessage
+from network.wire.codec import encode
+from network.wire.messages import ConsensusMessage
 from sim.commands.app import app
 from sim.scenario.loading import load_scenario
 
@@ -111,8 +110,8 @@ def test_the_page_on_messages_reads_a_message():
     (program,) = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     names = {}
     exec(program, names)
-    numbers = np.array([1.5, -2.0, 3.25])
+    numbers = (1.5, -2.0, 3.25)
     data = encode("scene1", ConsensusMessage("C3", 10, 4, 2, numbers))
-    assert names["read_consensus"](data, "scene1", "C3") == (10, 4, 2, tuple(numbers))
+    assert names["read_consensus"](data, "scene1", "C3") == (10, 4, 2, numbers)
     with pytest.raises(ValueError, match="another sender"):
         names["read_consensus"](data, "scene1", "C2")

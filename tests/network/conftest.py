@@ -5,9 +5,9 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from network import graph
-from network.consensus import Consensus
-from network.graph import Graph
+from network.graphs import graph
+from network.graphs.graph import Graph
+from network.rounds.consensus import Consensus
 
 
 def run_rounds(net, algorithm, iterations, values, *, loss=0.0, rng=None, quantizers=None, during=None):

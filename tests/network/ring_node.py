@@ -12,13 +12,13 @@ import time
 
 import numpy as np
 
-from network import graph
-from network.consensus import Consensus
-from network.messages import ConfirmMessage, EstimateMessage, PixelsMessage
+from network.averaging.weights import MetropolisWeights
+from network.graphs import graph
+from network.links.transport import links_of
+from network.links.zenoh import ZenohTransport
+from network.rounds.consensus import Consensus
 from network.streams import stream
-from network.transport import links_of
-from network.weights import MetropolisWeights
-from network.zenoh import ZenohTransport
+from network.wire.messages import ConfirmMessage, EstimateMessage, PixelsMessage
 
 
 def own_value(name, frame):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from network import graph
 from network.averaging import matrices
 from network.averaging.best_constant import BestConstant
 from network.averaging.chebyshev import Chebyshev
@@ -14,7 +13,8 @@ from network.averaging.constant import ConstantWeights
 from network.averaging.finite_time import FiniteTime, leja_order
 from network.averaging.metropolis import MetropolisWeights
 from network.averaging.ratio import Ratio
-from network.spectrum import spectrum_of
+from network.graphs import graph
+from network.graphs.spectrum import spectrum_of
 
 
 def eigenvalues(net):

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from network import codec, graph
 from network.averaging import matrices
 from network.averaging.best_constant import BestConstant
 from network.averaging.chebyshev import Chebyshev
@@ -16,10 +15,12 @@ from network.averaging.event_triggered import EventTriggered, distance
 from network.averaging.finite_time import FiniteTime
 from network.averaging.metropolis import MetropolisWeights
 from network.averaging.ratio import Ratio
-from network.consensus import Consensus
-from network.graph import Graph
-from network.messages import ConsensusMessage
-from network.quantization import PayloadOptions, Quantizer
+from network.graphs import graph
+from network.graphs.graph import Graph
+from network.rounds.consensus import Consensus
+from network.wire import codec
+from network.wire.messages import ConsensusMessage
+from network.wire.quantization import PayloadOptions, Quantizer
 
 ALL = {
     "constant": lambda net: ConstantWeights(epsilon=0.9 / net.max_degree),

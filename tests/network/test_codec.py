@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from network import codec
 from network.errors import RefusedMessage
-from network.messages import (
+from network.wire import codec
+from network.wire.messages import (
     ConfirmMessage,
     ConsensusMessage,
     ControlMessage,
@@ -23,7 +23,7 @@ from network.messages import (
     TruthMessage,
     Visibility,
 )
-from network.quantization import Quantizer
+from network.wire.quantization import Quantizer
 
 RUN = "scene1"
 finite = st.floats(-1e150, 1e150)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from network.conditions import NS, QUEUE_S, Channel, ConditionsOptions
+from network.links.conditions import NS, QUEUE_S, Channel, ConditionsOptions
 
 PARTED = {"groups": [["A", "B"], ["C"]], "first_frame": 3, "frames": 2}
 

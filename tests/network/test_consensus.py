@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from network import graph
-from network.consensus import Consensus
-from network.graph import Graph
-from network.messages import ConsensusMessage
-from network.weights import ConstantWeights, MetropolisWeights
+from network.averaging.weights import ConstantWeights, MetropolisWeights
+from network.graphs import graph
+from network.graphs.graph import Graph
+from network.rounds.consensus import Consensus
+from network.wire.messages import ConsensusMessage
 
 METROPOLIS = MetropolisWeights()
 NAMES = tuple("ABCDEFGH")

@@ -6,13 +6,13 @@ import time
 import numpy as np
 import pytest
 
-from network.conditions import NS, Channel, ConditionsOptions
-from network.consensus import Consensus
-from network.disturbed import DisturbedTransport
-from network.messages import ConsensusMessage
-from network.transport import Links, Loss
-from network.weights import MetropolisWeights
-from network.zenoh import ZenohTransport
+from network.averaging.weights import MetropolisWeights
+from network.links.conditions import NS, Channel, ConditionsOptions
+from network.links.disturbed import DisturbedTransport
+from network.links.transport import Links, Loss
+from network.links.zenoh import ZenohTransport
+from network.rounds.consensus import Consensus
+from network.wire.messages import ConsensusMessage
 
 pytestmark = pytest.mark.processes
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from network import graph
-from network.graph import Graph
+from network.graphs import graph
+from network.graphs.graph import Graph
 
 NAMES = tuple(f"C{i}" for i in range(12))
 

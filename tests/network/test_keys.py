@@ -2,7 +2,7 @@
 
 import pytest
 
-from network import keys
+from network.wire import keys
 
 
 @pytest.mark.parametrize(

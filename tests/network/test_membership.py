@@ -5,12 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from network import codec, graph
-from network.consensus import Consensus
-from network.graph import Graph
-from network.membership import Membership
-from network.messages import ConsensusMessage
-from network.weights import MetropolisWeights
+from network.averaging.weights import MetropolisWeights
+from network.graphs import graph
+from network.graphs.graph import Graph
+from network.rounds.consensus import Consensus
+from network.rounds.membership import Membership
+from network.wire import codec
+from network.wire.messages import ConsensusMessage
 
 NAMES = tuple("ABCDEFGH")
 

@@ -3,11 +3,18 @@
 import numpy as np
 import pytest
 
-from network import codec, graph
-from network.conditions import NS, ConditionsOptions
-from network.memory import MemoryNetwork
-from network.messages import ConfirmMessage, ConsensusMessage, ControlMessage, PixelsMessage, StatusMessage
-from network.transport import Links, links_of
+from network.graphs import graph
+from network.links.conditions import NS, ConditionsOptions
+from network.links.memory import MemoryNetwork
+from network.links.transport import Links, links_of
+from network.wire import codec
+from network.wire.messages import (
+    ConfirmMessage,
+    ConsensusMessage,
+    ControlMessage,
+    PixelsMessage,
+    StatusMessage,
+)
 
 NAMES = ("A", "B", "C", "D")
 

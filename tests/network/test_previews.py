@@ -9,11 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from network import codec, jpeg, keys, sessions
 from network.errors import RefusedMessage
-from network.messages import PreviewMessage
-from network.transport import Links
-from network.zenoh import ZenohTransport
+from network.links import sessions
+from network.links.transport import Links
+from network.links.zenoh import ZenohTransport
+from network.wire import codec, jpeg, keys
+from network.wire.messages import PreviewMessage
 
 IMAGE = np.random.default_rng(0).integers(0, 255, (24, 32, 3), np.uint8)
 JPEG = cv2.imencode(".jpg", IMAGE)[1].tobytes()

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from network.quantization import PayloadOptions, Quantizer, half_exponent
+from network.wire.quantization import PayloadOptions, Quantizer, half_exponent
 
 payloads = st.lists(st.floats(-1e37, 1e37), min_size=1, max_size=9).map(tuple)
 

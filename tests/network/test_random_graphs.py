@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from network.random_graphs import geometric, watts_strogatz
+from network.graphs.random_graphs import geometric, watts_strogatz
 
 NAMES = tuple(f"C{i}" for i in range(20))
 

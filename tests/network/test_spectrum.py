@@ -4,10 +4,10 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from network import graph
 from network.averaging.finite_time import leja_order
-from network.graph import Graph
-from network.spectrum import LARGEST_DENSE, extremes_of, spectrum_of
+from network.graphs import graph
+from network.graphs.graph import Graph
+from network.graphs.spectrum import LARGEST_DENSE, extremes_of, spectrum_of
 
 NAMES = tuple(f"{i:02}" for i in range(12))
 

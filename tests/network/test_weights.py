@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from network.weights import ConsensusOptions, ConstantWeights, MetropolisWeights
+from network.averaging.weights import ConsensusOptions, ConstantWeights, MetropolisWeights
 
 degrees = st.integers(1, 50)
 

@@ -14,11 +14,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from network import codec, graph, keys, sessions
-from network.consensus import Consensus
+from network.averaging.weights import MetropolisWeights
 from network.errors import NetworkError
-from network.memory import MemoryNetwork
-from network.messages import (
+from network.graphs import graph
+from network.links import sessions
+from network.links.memory import MemoryNetwork
+from network.links.runtime import RUNTIME_ENVIRONMENT
+from network.links.transport import Links, links_of
+from network.links.zenoh import ZenohTransport, publish
+from network.rounds.consensus import Consensus
+from network.streams import stream
+from network.wire import codec, keys
+from network.wire.messages import (
     ConfirmMessage,
     ConsensusMessage,
     ControlMessage,
@@ -26,11 +33,6 @@ from network.messages import (
     PixelsMessage,
     StatusMessage,
 )
-from network.runtime import RUNTIME_ENVIRONMENT
-from network.streams import stream
-from network.transport import Links, links_of
-from network.weights import MetropolisWeights
-from network.zenoh import ZenohTransport, publish
 
 pytestmark = pytest.mark.processes
 

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from nodes.calibration import CalibrationError, cropped, read_opencv, read_qualisys, scaled
-from nodes.camera import Camera
+from nodes.imaging.calibration import CalibrationError, cropped, read_opencv, read_qualisys, scaled
+from nodes.imaging.camera import Camera
 
 
 @pytest.fixture

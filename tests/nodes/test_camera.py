@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodes.camera import Camera, look_at
+from nodes.imaging.camera import Camera, look_at
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from network.messages import ConfirmMessage, EstimateMessage, PixelsMessage
+from network.wire.messages import ConfirmMessage, EstimateMessage, PixelsMessage
 from nodes.central import MAX_AHEAD, Central
 
 NAMES = ("C1", "C2", "C3", "C4")

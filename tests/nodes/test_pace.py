@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodes.pace import Pace, lag_for
+from nodes.shell.pace import Pace, lag_for
 
 
 @given(st.sampled_from(["lockstep", "realtime"]), st.floats(0.5, 120), st.integers(1, 50), st.integers(0, 20))

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nodes.filtering.particles import Particles, uniform_log_weights
-from nodes.preview import N_SHOWN, preview, thinned
+from nodes.shell.preview import N_SHOWN, preview, thinned
 
 
 def particles_of(n, weights=None):
@@ -45,8 +45,8 @@ def test_a_preview_is_the_picture_nearly():
 
 def test_looking_changes_no_numbers(room):
     """A smart camera that shows every frame estimates what one does that shows none."""
-    from network.consensus import Consensus
-    from network.weights import MetropolisWeights
+    from network.averaging.weights import MetropolisWeights
+    from network.rounds.consensus import Consensus
     from nodes.smart_camera import SmartCamera
 
     furnished = room()

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from network.consensus import Consensus
-from network.graph import ring
-from network.membership import Membership
-from network.messages import ConsensusMessage, EstimateMessage
-from network.weights import MetropolisWeights
-from nodes.estimator import SirEstimator
+from network.averaging.weights import MetropolisWeights
+from network.graphs.graph import ring
+from network.rounds.consensus import Consensus
+from network.rounds.membership import Membership
+from network.wire.messages import ConsensusMessage, EstimateMessage
+from nodes.estimators.estimator import SirEstimator
 from nodes.filtering.fusion import FusionOptions
 from nodes.smart_camera import SmartCamera
 

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from nodes.sources import SourceError, VideoSource
+from nodes.imaging.sources import SourceError, VideoSource
 
 N_FRAMES = 12
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodes.camera import look_at
 from nodes.counting.histogram import SamplingOptions
 from nodes.filtering.particles import Particles, normalize, resample, systematic_indices
+from nodes.imaging.camera import look_at
 from nodes.threads import in_shares, n_shares
 from nodes.vision import observation
 from nodes.vision.observation import ObservationModel, ObservationOptions

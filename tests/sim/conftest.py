@@ -6,8 +6,8 @@ import textwrap
 import pytest
 
 from sim.assembly import Assembly
+from sim.results.results import Results, summarize
 from sim.running.in_process import run_in_process
-from sim.running.results import Results, summarize
 from sim.scenario.loading import load_scenario
 
 SMALL = """

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from network.codec import encode_public
-from network.messages import EstimateMessage
+from network.wire.codec import encode_public
+from network.wire.messages import EstimateMessage
 from sim.assembly import Assembly
+from sim.results.results import Results, summarize
 from sim.running.in_process import run_in_process
-from sim.running.results import Results, summarize
 from sim.scenario.advice import advice
 from sim.scenario.loading import load_scenario
 

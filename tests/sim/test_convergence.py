@@ -5,13 +5,13 @@ import itertools
 import numpy as np
 import pytest
 
-from network import graph
 from network.averaging import matrices
 from network.averaging.metropolis import MetropolisWeights
-from network.consensus import Consensus
-from network.messages import EstimateMessage
+from network.graphs import graph
+from network.rounds.consensus import Consensus
+from network.wire.messages import EstimateMessage
 from sim.pictures.convergence import plot_convergence
-from sim.running.convergence import ALGORITHMS, average, converge
+from sim.results.convergence import ALGORITHMS, average, converge
 from sim.scenario.loading import load_scenario
 
 

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from nodes.camera import Camera, look_at
+from nodes.imaging.camera import Camera, look_at
 from sim.pictures.ground import field_of_view
 
 CAMERAS = [

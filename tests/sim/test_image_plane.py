@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from network.messages import EstimateMessage, TruthMessage
+from network.wire.messages import EstimateMessage, TruthMessage
 from sim.assembly import Assembly
 from sim.commands.app import app
 from sim.experiments.found.figures import compare
 from sim.metrics.errors import LOST_DIAGONALS
 from sim.pictures.clip import make_clip
-from sim.running.recorder import Recorder, read_run
-from sim.running.results import Results, length, summarize
+from sim.results.recorder import Recorder, read_run
+from sim.results.results import Results, length, summarize
 from sim.scenario.loading import load_scenario
 from sim.scenario.parsing import ScenarioError
 from sim.world.figure import HEAD_MIDDLE

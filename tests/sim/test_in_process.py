@@ -2,9 +2,9 @@
 
 import pytest
 
-from network.codec import encode_public
-from network.messages import EstimateMessage, StatusMessage, TruthMessage
-from sim.running.results import Results, summarize
+from network.wire.codec import encode_public
+from network.wire.messages import EstimateMessage, StatusMessage, TruthMessage
+from sim.results.results import Results, summarize
 from sim.scenario.loading import load_scenario
 
 HEADER, NUMBER = 24, 8

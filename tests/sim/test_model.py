@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from network.messages import EstimateMessage
+from network.wire.messages import EstimateMessage
 from sim.assembly import Assembly
+from sim.results.recorder import Recorder
 from sim.running.in_process import run_in_process
-from sim.running.recorder import Recorder
 from sim.scenario.loading import cameras_of, load_scenario
 from sim.scenario.parsing import ScenarioError
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from network.messages import EstimateMessage, TruthMessage
-from nodes.camera import look_at
+from network.wire.messages import EstimateMessage, TruthMessage
+from nodes.imaging.camera import look_at
 from nodes.vision.target import TargetOptions
 from sim.assembly import Assembly
 from sim.pictures import canvas, ground
@@ -22,7 +22,7 @@ from sim.pictures.ground_map import GroundMap
 from sim.pictures.overlay import draw_frame
 from sim.pictures.plots import plot_errors, plot_trajectories, write_figure
 from sim.pictures.theme import COLORS, LABELS
-from sim.running.results import Results
+from sim.results.results import Results
 from sim.scenario.model import Scenario
 from sim.world.colors import bgr
 

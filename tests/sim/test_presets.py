@@ -2,7 +2,7 @@
 
 import pytest
 
-from network.weights import ConstantWeights, MetropolisWeights
+from network.averaging.weights import ConstantWeights, MetropolisWeights
 from sim.scenario.loading import load_scenario
 from sim.scenario.presets import ONE_CAMERA, PAPER, PERSON_PARTS, ROBUST, preset_defaults
 

@@ -7,9 +7,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from network.messages import EstimateMessage, TruthMessage
-from sim.running.recorder import Recorder, RecordingError, expected_tracks, read_run
-from sim.running.results import Results, summarize
+from network.wire.messages import EstimateMessage, TruthMessage
+from sim.results.recorder import Recorder, RecordingError, expected_tracks, read_run
+from sim.results.results import Results, summarize
 from sim.scenario.loading import load_scenario
 
 

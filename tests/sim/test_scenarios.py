@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from network.codec import encode_public
-from network.messages import EstimateMessage
+from network.wire.codec import encode_public
+from network.wire.messages import EstimateMessage
 from sim.assembly import Assembly
 from sim.commands.inspect import scenario_schema
 from sim.footage import FootageError, locate

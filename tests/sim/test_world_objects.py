@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from nodes.camera import look_at
+from nodes.imaging.camera import look_at
 from sim.assembly import Assembly
 from sim.scenario.loading import load_scenario
 from sim.world.figure import HEAD_MIDDLE

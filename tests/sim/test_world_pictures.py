@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from nodes.camera import Camera, look_at
+from nodes.imaging.camera import Camera, look_at
 from sim.world.colors import bgr
 from sim.world.figure import figures
 from sim.world.light import LightingOptions, build_light, gain_at

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from nodes.camera import look_at
+from nodes.imaging.camera import look_at
 from sim.world.background import lines_of_sight
 from sim.world.occluders import OccluderOptions, build_occluder
 from sim.world.room import RoomOptions, along_wall, distance_to_wall, inside

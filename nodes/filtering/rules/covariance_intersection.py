@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from network.codec import pack_symmetric
+from network.wire.codec import pack_symmetric
 from nodes.filtering.gaussian import Moments, to_moments
 from nodes.filtering.rules.rule import LocalEstimate, joined, split_information, triangle
 

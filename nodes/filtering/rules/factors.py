@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from network.codec import pack_symmetric
+from network.wire.codec import pack_symmetric
 from nodes.filtering.gaussian import Information
 from nodes.filtering.rules.rule import LocalEstimate, joined, split_information, triangle
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from network.codec import pack_symmetric
+from network.wire.codec import pack_symmetric
 from nodes.filtering.gaussian import Information, Moments, to_moments
 from nodes.filtering.rules.rule import LocalEstimate, joined, plus_on_position, split_information, triangle
 

@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from network.codec import unpack_symmetric
+from network.wire.codec import unpack_symmetric
 from nodes.filtering.gaussian import Information, Moments
 
 

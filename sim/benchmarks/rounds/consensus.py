@@ -7,7 +7,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 
-from network.runtime import RUNTIME_ENVIRONMENT
+from network.links.runtime import RUNTIME_ENVIRONMENT
 from sim.running.children import RunFailed
 
 SHAPES = ("ring", "grid")

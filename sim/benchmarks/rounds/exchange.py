@@ -12,13 +12,14 @@ import numpy as np
 import zenoh
 from zenoh import CongestionControl, Locality, Priority
 
-from network import codec, keys, sessions
 from network.averaging.metropolis import MetropolisWeights
-from network.consensus import Consensus
-from network.graph import Graph
-from network.messages import ConsensusMessage
-from network.transport import Links
-from network.zenoh import ZenohTransport
+from network.graphs.graph import Graph
+from network.links import sessions
+from network.links.transport import Links
+from network.links.zenoh import ZenohTransport
+from network.rounds.consensus import Consensus
+from network.wire import codec, keys
+from network.wire.messages import ConsensusMessage
 
 N_NUMBERS = 5
 """What the net information has on a plane."""
@@ -35,7 +36,7 @@ class Exchange(Protocol):
 
 
 class ConsensusRounds:
-    """The rounds of a run: `network.consensus` over `network.zenoh`."""
+    """The rounds of a run: `network.rounds` over `network.links.zenoh`."""
 
     def __init__(self, run: str, name: str, graph: Graph, folder: str) -> None:
         """Opens the node's transport and waits for its neighbours.

@@ -11,7 +11,7 @@ from collections import deque
 from statistics import median
 from typing import Any
 
-from network.graph import Graph
+from network.graphs.graph import Graph
 from sim.benchmarks.rounds.exchange import (
     ROUNDS,
     BareZenoh,

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from nodes.sources import FrameSource
+from nodes.imaging.sources import FrameSource
 from nodes.vision.color import ColorOptions, quantize
 from sim.assembly import Assembly
 

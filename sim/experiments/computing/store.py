@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from sim.running.recorder import RecordingError
+from sim.results.recorder import RecordingError
 
 
 class Store:

@@ -12,8 +12,8 @@ from sim.experiments.computing.errors import EngineError
 from sim.experiments.computing.parts import Part, code_version
 from sim.experiments.computing.pictures import CodedSource, KeptSource, kept_pictures
 from sim.metrics.consistency import nees
+from sim.results.results import Results, Track, summarize
 from sim.running.in_process import run_in_process
-from sim.running.results import Results, Track, summarize
 from sim.scenario.model import Scenario
 
 _DIGITS = 5

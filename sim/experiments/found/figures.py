@@ -8,7 +8,7 @@ import numpy as np
 
 from sim.metrics.consistency import anees_band
 from sim.metrics.intervals import mean_interval
-from sim.running.results import in_unit, length
+from sim.results.results import in_unit, length
 
 _ESTIMATORS = ("dcpf", "cpf", "best_single")
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from sim.running.results import length
+from sim.results.results import length
 
 
 def joined(summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:

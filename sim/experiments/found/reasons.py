@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 from sim.experiments.found.findings import GroupFindings, Track
 from sim.metrics.errors import is_lost
 from sim.metrics.intervals import Interval, bootstrap, mean_interval, ratio_interval
-from sim.running.results import Results, length
+from sim.results.results import Results, length
 
 LITTLE = 0.1
 """Single cameras hardly depend on a key if their error changes by less than this part of it."""

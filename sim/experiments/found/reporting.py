@@ -18,7 +18,7 @@ from sim.experiments.found.findings import Findings, GroupFindings, Track
 from sim.metrics.errors import is_lost
 from sim.metrics.intervals import mean_interval
 from sim.metrics.sets import gospa, ospa
-from sim.running.results import Results, in_unit, length
+from sim.results.results import Results, in_unit, length
 
 _TRACKS: tuple[Track, ...] = ("dcpf", "cpf", "single", "coded")
 

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from nodes.camera import look_at
 from nodes.filtering.fusion import FusionOptions, fuse, pack, propagate, unpack
 from nodes.filtering.gaussian import Information, Moments, log_factor, moments
 from nodes.filtering.local import local_filter
 from nodes.filtering.motion import DynamicsOptions, autoregression, constant_velocity, predict
 from nodes.filtering.particles import resample_if_degenerate, sample_gaussian
 from nodes.filtering.sir import View, sir_step
+from nodes.imaging.camera import look_at
 from nodes.vision.observation import ObservationModel, ObservationOptions, Picture
 from nodes.vision.target import TargetOptions
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from network.averaging import matrices
-from network.graph import ring
+from network.graphs.graph import ring
 from nodes.filtering.fusion import RULES, FusionOptions, Posterior, fuse, left_of, pack, unpack
 from nodes.filtering.gaussian import Information, Moments, moments, to_information
 from nodes.filtering.local import LocalGaussians, local_filter

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nodes.camera import look_at
 from nodes.counting.histogram import SamplingOptions
+from nodes.imaging.camera import look_at
 from nodes.vision.appearance import ModelUpdateOptions
 from nodes.vision.color import ColorOptions
 from nodes.vision.likelihood import LikelihoodOptions

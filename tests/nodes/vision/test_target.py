@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from nodes.camera import look_at
+from nodes.imaging.camera import look_at
 from nodes.vision.target import TargetOptions, project_boxes, visible_fraction
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from network.graph import grid, ring
+from network.graphs.graph import grid, ring
 from sim.benchmarks.rounds.consensus import bench_consensus
 from sim.benchmarks.rounds.exchange import PlainSockets, connected
 from sim.running.children import RunFailed

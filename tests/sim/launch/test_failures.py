@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from sim.running.recorder import read_run
+from sim.results.recorder import read_run
 
 pytestmark = [
     pytest.mark.processes,

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from sim.assembly import Assembly
+from sim.results.recorder import Recorder
 from sim.running.in_process import run_in_process
-from sim.running.recorder import Recorder
 from sim.scenario.loading import load_scenario
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(90)]

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from sim.running.recorder import FILM
+from sim.results.recorder import FILM
 
 pytestmark = [
     pytest.mark.processes,

@@ -9,7 +9,7 @@ from collections import Counter
 import pytest
 
 from sim.replay.opening import open_recording
-from sim.running.recorder import FILM
+from sim.results.recorder import FILM
 
 pytestmark = [
     pytest.mark.processes,

@@ -12,12 +12,13 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from network import codec, keys, sessions
 from network.errors import NetworkError
-from network.messages import ControlMessage, PreviewMessage, StatusMessage, TruthMessage
-from network.transport import Links
-from network.zenoh import ZenohTransport, publish
-from nodes.preview import encode_jpeg
+from network.links import sessions
+from network.links.transport import Links
+from network.links.zenoh import ZenohTransport, publish
+from network.wire import codec, keys
+from network.wire.messages import ControlMessage, PreviewMessage, StatusMessage, TruthMessage
+from nodes.shell.preview import encode_jpeg
 from sim.assembly import Assembly
 from sim.live.server import LiveServer
 from sim.live.story import Story

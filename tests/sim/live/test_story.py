@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from network.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
+from network.wire.messages import EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from nodes.vision.target import project_boxes
 from sim.assembly import Assembly
 from sim.live.nodes import NodeStates
 from sim.live.setting import setting
 from sim.live.story import Story
+from sim.results.results import Results
 from sim.running.in_process import run_in_process
-from sim.running.results import Results
 from sim.scenario.loading import load_scenario
 
 WICA = Path(__file__).parents[3] / "scenarios" / "wica.yaml"

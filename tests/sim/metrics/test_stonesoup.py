@@ -19,11 +19,11 @@ from stonesoup.types.hypothesis import SingleHypothesis
 from stonesoup.types.state import GaussianState, ParticleState, State
 from stonesoup.updater.particle import ParticleUpdater
 
-from nodes.camera import look_at
 from nodes.filtering.gaussian import Information, log_factor
 from nodes.filtering.motion import DynamicsOptions, constant_velocity, predict
 from nodes.filtering.particles import sample_gaussian
 from nodes.filtering.sir import View, sir_step
+from nodes.imaging.camera import look_at
 from nodes.vision.observation import ObservationModel, ObservationOptions, Picture
 from nodes.vision.target import TargetOptions
 from sim.metrics.bounds import posterior_cramer_rao

@@ -8,8 +8,8 @@ import pytest
 
 from sim.assembly import Assembly
 from sim.recording.film import McapFilm
+from sim.results.recorder import FILM, Recorder
 from sim.running.in_process import run_in_process
-from sim.running.recorder import FILM, Recorder
 from sim.scenario.loading import load_scenario
 
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from sim.commands.app import app
 from sim.recording.filmed import opened
-from sim.running.recorder import read_run
+from sim.results.recorder import read_run
 
 
 def test_a_recording_draws_as_its_run_does(recorded):
@@ -55,7 +55,7 @@ def test_an_extra_that_is_missing_is_one_sentence(recorded, monkeypatch, command
 
 def test_a_run_without_pictures_is_not_for_rerun(recorded):
     from sim.replay.opening import film_of
-    from sim.running.recorder import RecordingError
+    from sim.results.recorder import RecordingError
 
     run = recorded(("frames", "2"), pictures=False)
     with pytest.raises(RecordingError, match="run it again with --record"):

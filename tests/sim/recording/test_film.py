@@ -12,13 +12,13 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
-from network.messages import EstimateMessage, PreviewMessage
+from network.wire.messages import EstimateMessage, PreviewMessage
 from nodes.vision.target import project_boxes
 from sim.assembly import Assembly
 from sim.recording import foxglove
 from sim.recording.film import McapFilm
+from sim.results.recorder import Recorder, RecordingError
 from sim.running.in_process import run_in_process
-from sim.running.recorder import Recorder, RecordingError
 from sim.scenario.loading import load_scenario
 
 WICA = Path(__file__).parents[3] / "scenarios" / "wica.yaml"

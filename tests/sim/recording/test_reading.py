@@ -8,12 +8,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from network import codec
-from network.messages import PreviewMessage
+from network.wire import codec
+from network.wire.messages import PreviewMessage
 from sim.recording.reader import McapRecording
 from sim.replay.folder import FolderRecording
 from sim.replay.opening import open_recording
-from sim.running.recorder import FILM, RecordingError
+from sim.results.recorder import FILM, RecordingError
 
 
 def all_of(recording, *, pictures=True):

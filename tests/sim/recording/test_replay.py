@@ -5,8 +5,9 @@ from contextlib import closing
 
 import pytest
 
-from network import keys, sessions
 from network.errors import NetworkError
+from network.links import sessions
+from network.wire import keys
 from sim.replay.opening import open_recording
 from sim.replay.playback import Playback
 from sim.replay.player import Replay

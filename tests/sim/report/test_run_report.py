@@ -15,8 +15,8 @@ from sim.pictures.theme import PARTICLE
 from sim.report import stills
 from sim.report.retelling import told_again
 from sim.report.stills import choose_moments, moments_of
-from sim.running.recorder import read_run
-from sim.running.results import Results
+from sim.results.recorder import read_run
+from sim.results.results import Results
 from sim.world.colors import bgr
 
 HOSTILE = "<script>alert('1')</script> & \"<img src=x onerror=alert(1)>"

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodes.camera import look_at
+from nodes.imaging.camera import look_at
 from sim.simulation.sensor import SensorOptions, Sensors, measure
 
 seeds = st.integers(0, 2**32 - 1)

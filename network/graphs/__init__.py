@@ -1,0 +1,1 @@
+"""Who talks to whom: graphs, and what their spectra tell."""

@@ -1,0 +1,1 @@
+"""What carries messages: Zenoh, memory, and links that are bad on purpose."""

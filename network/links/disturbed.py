@@ -1,0 +1,98 @@
+"""Bad links among processes: what Zenoh delivers goes through the scenario's channels before it is heard.
+
+The channels are those of runs in one process, with the same draws for the same messages. In real time they go
+by the clock. In lockstep time does not count: whoever is late is waited for, and what is lost is known to be
+so at once. Nobody waits for a deadline, and a run has the numbers of one in virtual time.
+"""
+
+import time
+from collections import deque
+from collections.abc import Mapping, Sequence
+
+from network.links.conditions import NS, Channel
+from network.links.transport import Links, Loss
+from network.links.zenoh import ZenohTransport
+from network.wire import codec
+from network.wire.messages import ConsensusMessage, PeerMessage
+
+_LOOK_S = 5e-4
+"""How often the links are looked at in real time: what has come is taken at its time."""
+_FREE_NS = 3600 * NS
+"""In lockstep, the time between two messages of a channel: its line is free again."""
+
+
+class DisturbedTransport(ZenohTransport):
+    """A node's way to the others, over links that lose, delay and double the messages of the rounds."""
+
+    def __init__(
+        self,
+        run: str,
+        name: str,
+        links: Links,
+        listen: Sequence[str],
+        connect: Sequence[str],
+        channels: Mapping[str, Channel],
+        *,
+        realtime: bool,
+    ) -> None:
+        """Opens the session and declares everything but the node's token.
+
+        Args:
+            run: Name of the run.
+            name: The node.
+            links: The nodes that it is linked to.
+            listen: Endpoints where they find it.
+            connect: Endpoints of the router and of those that it has to find.
+            channels: From each neighbour to this node.
+            realtime: Whether time counts; if not, frames are in lockstep.
+
+        Raises:
+            NetworkError: An endpoint is malformed, or one to listen on cannot be had.
+        """
+        super().__init__(run, name, links, listen, connect, drop_late_pixels=realtime)
+        self._channels, self._realtime = dict(channels), realtime
+        self._now_ns = dict.fromkeys(channels, 0)
+        self._due: dict[str, deque[tuple[int, ConsensusMessage]]] = {sender: deque() for sender in channels}
+
+    def receive(self, sender: str, timeout_s: float) -> PeerMessage | Loss | None:
+        """The next message of a linked node that its channel has let through by now."""
+        if sender not in self._channels:
+            return super().receive(sender, timeout_s)
+        if not self._realtime:
+            return self._receive_in_lockstep(sender, timeout_s)
+        due, deadline = self._due[sender], time.monotonic() + timeout_s
+        while True:
+            for each in self._channels:
+                while isinstance(message := super().receive(each, 0.0), ConsensusMessage):
+                    self._carry(each, message, time.monotonic_ns())
+            if due and due[0][0] <= time.monotonic_ns():
+                return due.popleft()[1]
+            left_s = deadline - time.monotonic()
+            if left_s <= 0 or not (due or self.alive(sender)):
+                return None
+            time.sleep(min(left_s, _LOOK_S))
+
+    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | Loss, ...]:
+        """The next message of each of several linked nodes that its channel has let through by now."""
+        deadline = time.monotonic() + timeout_s
+        came = [self.receive(sender, max(deadline - time.monotonic(), 0.0)) for sender in senders]
+        return tuple([message for message in came if message is not None])
+
+    def _receive_in_lockstep(self, sender: str, timeout_s: float) -> PeerMessage | Loss | None:
+        due = self._due[sender]
+        if not due:
+            message = super().receive(sender, timeout_s)
+            if not isinstance(message, ConsensusMessage):
+                return message
+            self._now_ns[sender] += _FREE_NS
+            if not self._carry(sender, message, self._now_ns[sender]):
+                return Loss(sender, message.frame, message.round)
+        return due.popleft()[1]
+
+    def _carry(self, sender: str, message: ConsensusMessage, now_ns: int) -> int:
+        """Puts a message into its channel; returns how often it will come out."""
+        size_bytes = len(codec.encode_consensus(self._run, message))
+        arrivals = self._channels[sender].carry(now_ns, size_bytes, message.frame)
+        self.counters.received[sender] += len(arrivals) - 1
+        self._due[sender].extend((arrival_ns, message) for arrival_ns in arrivals)
+        return len(arrivals)

@@ -1,0 +1,1 @@
+"""Rounds of consensus: a state machine, and who takes part."""

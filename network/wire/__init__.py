@@ -1,0 +1,1 @@
+"""What is said: messages, their bytes, and under which keys."""

@@ -1,0 +1,146 @@
+"""The tracker of Medeiros et al. (2008), whole on the emulated processor array, as a camera's own estimator.
+
+In the image plane of one camera, with `filter.backend: simd`, prediction, weights, mean and resampling run on
+the array too, and not the likelihood alone.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from network.wire.messages import EstimateMessage
+from nodes.filtering.gaussian import Moments, moments
+from nodes.filtering.motion import DynamicsOptions
+from nodes.filtering.sighting import Sighting, shrinkage
+from nodes.setup import TrackingSetup
+from nodes.simd.memory import LineMemoryError
+from nodes.simd.programs.binning import BinningOptions
+from nodes.simd.report import FrameReport
+from nodes.simd.tracker import SimdTracker
+from nodes.simd.tracker_options import TrackerOptions
+from nodes.vision.appearance import Appearance
+from nodes.vision.observation import ObservationModel, Picture
+
+
+class ArrayEstimator:
+    """A camera's own filter on the array."""
+
+    def __init__(self, node: str, setup: TrackingSetup) -> None:
+        """A filter before its first frame.
+
+        Args:
+            node: Name of the node that runs it.
+            setup: What the run tracks.
+
+        Raises:
+            ValueError: The array cannot do what the options ask for; the text says which and what to do.
+        """
+        self._node, self._setup = node, setup
+        try:
+            self._tracker = SimdTracker(_tracker_options(setup), setup.stream(node, "array"))
+        except LineMemoryError as error:
+            raise ValueError(f"filter.simd.words is {setup.filter.simd.words}: {error}") from error
+        self._appearance: Appearance | None = None
+        self._sighting = Sighting()
+        self._before = setup.start.moments
+
+    @property
+    def report(self) -> FrameReport:
+        """What the last frame has cost."""
+        return self._tracker.report()
+
+    def begin(self, picture: Picture, appearance: Appearance | None) -> EstimateMessage:
+        """Frame 0: takes the reference at the target's start.
+
+        Args:
+            picture: Of the camera.
+            appearance: What the target looks like, to tell whether the estimate shows it.
+
+        Raises:
+            ValueError: The picture is wider than the array.
+        """
+        self._appearance = appearance
+        self._tracker.begin(picture.image, self._before.mean[:2])
+        n = float(self._setup.filter.n_particles)
+        return self._message(0, self._before, n, visible=True)
+
+    def step(self, frame: int, pictures: Mapping[str, tuple[ObservationModel, Picture]]) -> EstimateMessage:
+        """One frame.
+
+        Args:
+            frame: Its index.
+            pictures: The camera's picture, and how it observes.
+        """
+        model, picture = pictures[self._node]
+        position = self._tracker.step(picture.image)[0]
+        particles, weights = self._tracker.particles(), self._tracker.weights()
+        after = moments(particles, weights)
+        ratio = shrinkage(moments(particles, np.full(len(particles), 1 / len(particles))), after)
+        self._sighting = self._sighting.after(ratio)
+        # [x, y, x_prev, y_prev], as the array holds it
+        state = Moments(
+            np.r_[position, self._before.mean[:2]],
+            np.block(
+                [
+                    [after.covariance, np.zeros((2, 2))],
+                    [np.zeros((2, 2)), self._before.covariance[:2, :2]],
+                ]
+            ),
+        )
+        self._before = state
+        visible = self._appearance is not None and model.sees(
+            model.sight(picture, position, self._appearance), self._appearance
+        )
+        return self._message(frame, state, self._tracker.ess(), visible=visible)
+
+    def _message(self, frame: int, estimate: Moments, ess: float, *, visible: bool) -> EstimateMessage:
+        return EstimateMessage(
+            run=self._setup.run,
+            node=self._node,
+            estimator="single",
+            frame=frame,
+            time_s=frame / self._setup.rate_hz,
+            mean=estimate.mean,
+            covariance=estimate.covariance,
+            visible=visible,
+            lost=self._sighting.lost,
+            ess=ess,
+            iterations=0,
+            members=(self._node,),
+        )
+
+
+def _tracker_options(setup: TrackingSetup) -> TrackerOptions:
+    """The tracker's options from those of the run.
+
+    Raises:
+        ValueError: The array's tracker has no program for one of them.
+    """
+    chosen, size_px = setup.filter, setup.target.size_px
+    if size_px is None or size_px != tuple(map(int, size_px)):
+        raise ValueError(
+            f"target.size_px is {size_px}: the array's tracker reads whole pixels, give such a size"
+        )
+    if chosen.color.space == "rgb":
+        raise ValueError(
+            "filter.color.space is rgb: the array's tracker bins hue or joint_rgb, take one of them"
+        )
+    return TrackerOptions(
+        simd=chosen.simd,
+        binning=BinningOptions(space=chosen.color.space, bins=chosen.color.bins_per_channel),
+        n_particles=(chosen.n_particles,),
+        region_px=(int(size_px[0]), int(size_px[1])),
+        process=_process(chosen.dynamics),
+        noise_px=float(np.sqrt(chosen.dynamics.position_variance)),
+        # set from the background, it would be too sharp for ten bits: the paper's tracker has a fixed one
+        sigma=chosen.likelihood.sigma,
+    )
+
+
+def _process(dynamics: DynamicsOptions) -> tuple[float, float]:
+    if dynamics.model != "autoregressive" or isinstance(dynamics.A, tuple) or isinstance(dynamics.B, tuple):
+        raise ValueError(
+            "filter.dynamics must be autoregressive with numbers for A and B on the array (Eq. 2): set"
+            " filter.dynamics.model, A and B"
+        )
+    return dynamics.A, dynamics.B

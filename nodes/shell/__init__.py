@@ -1,0 +1,1 @@
+"""The shell around a node: it listens, speaks and looks at the clock."""

@@ -1,0 +1,303 @@
+"""The shell around a node: the one place that listens, speaks, and looks at the clock.
+
+A node's life is four lines: announce, wait for the start, one frame after the other, leave.
+"""
+
+import math
+import time
+from collections.abc import Iterable
+from threading import Event
+
+import numpy as np
+from jaxtyping import UInt8
+
+from network.links.transport import Links, Loss, Transport
+from network.wire.messages import (
+    ConfirmMessage,
+    ConsensusMessage,
+    ControlMessage,
+    EstimateMessage,
+    PixelsMessage,
+)
+from nodes.central import Central
+from nodes.imaging.sources import FrameSource
+from nodes.shell.pace import Pace
+from nodes.shell.returning import LEAD, Returning
+from nodes.shell.telemetry import Counters, State, Telemetry
+from nodes.smart_camera import SmartCamera
+
+AHEAD = 2
+"""Frames that a camera may be ahead of the last one that the sink of its pictures has confirmed."""
+REPORT_PERIOD_S = 1.0
+"""How often a node tells how it is, while somebody looks."""
+PATIENCE_S = 0.25
+"""How long a wait lasts at most before the shell looks whether it has been told to stop."""
+TURN_S = 0.005
+"""How long it waits for one frame's messages where the rounds of several are under way."""
+
+
+class Shell:
+    """What the shells of a smart camera and of the central node share: start, clock, stop."""
+
+    def __init__(self, name: str, transport: Transport, pace: Pace, frames: int, stopped: Event) -> None:
+        """A shell before the start.
+
+        Args:
+            name: The node.
+            transport: Its way to the others.
+            pace: When frames begin and end.
+            frames: How many there are.
+            stopped: Set from outside when the node is to leave.
+        """
+        self.name, self.transport, self.pace, self.frames = name, transport, pace, frames
+        self.telemetry = Telemetry()
+        self._stopped = stopped
+        self._start_s = 0.0
+        self._reported_s = 0.0
+
+    def wait_for_start(self, linked: Iterable[str]) -> bool:
+        """Announces the node and waits for the start; False if it is told to leave instead.
+
+        Args:
+            linked: The nodes that it must hear before it says that it is ready.
+        """
+        self.transport.announce()
+        while not self.stopped:
+            missing = self.transport.wait_until_alive(linked, PATIENCE_S)
+            # Where a run is under way, those that are missing may be so for good.
+            ready = not missing or any(
+                self.transport.ask(name, PATIENCE_S) for name in linked if name not in missing
+            )
+            if ready:
+                # Said again until the start, for a launcher that comes later.
+                self.report("ready", -1, {})
+            order = self.transport.wait_for_control(PATIENCE_S if ready else 0)
+            if order is not None:
+                return self._obey(order)
+        return False
+
+    def wait_for_stop(self) -> None:
+        """Stays until everybody is done: a goodbye could overtake the last messages to the others."""
+        limit = time.monotonic() + self.pace.deadline_s
+        while not self.stopped and time.monotonic() < limit:
+            order = self.transport.wait_for_control(PATIENCE_S)
+            if order is not None and order.action == "stop":
+                return
+
+    def _obey(self, order: ControlMessage) -> bool:
+        if order.action == "stop":
+            self._stopped.set()
+            return False
+        self._start_s = order.start_time_s if order.start_time_s is not None else time.time()
+        return True
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the node is to leave."""
+        return self._stopped.is_set()
+
+    def await_frame(self, index: int) -> bool:
+        """Waits for a frame's time; False where it is over already, or the node is to leave."""
+        order = self.transport.wait_for_control(0)
+        if order is not None and order.action == "stop":
+            self._stopped.set()
+        if self.pace.kind == "realtime":
+            early = self.begins_in_s(index)
+            if early < -1 / self.pace.rate_hz and index > 0:
+                self.telemetry.late += 1
+                return False
+            self._stopped.wait(max(0.0, early))
+        return not self.stopped
+
+    def begins_in_s(self, index: int) -> float:
+        """How long it is until a frame's time; in lockstep, frames begin at once."""
+        if self.pace.kind == "lockstep":
+            return 0.0
+        return self._start_s + self.pace.begin_s(index) - time.time()
+
+    def began(self, index: int) -> float:
+        """When a frame that begins now is taken to have begun, on the monotonic clock."""
+        return time.monotonic() + self.begins_in_s(index)
+
+    def show(self, node: SmartCamera, index: int, image: UInt8[np.ndarray, "H W 3"]) -> None:
+        """Shows a frame that is done to those who look, if anybody does."""
+        if self.transport.watched:
+            self.transport.send(node.preview(index, image))
+            self.report_now_and_then(index, node.counters)
+
+    def report_now_and_then(self, index: int, counters: Counters) -> None:
+        """Tells those who look how the node is, once a second."""
+        if self.transport.watched and time.monotonic() - self._reported_s >= REPORT_PERIOD_S:
+            self._reported_s = time.monotonic()
+            self.report("running", index, counters)
+
+    def report(self, state: State, frame: int, counters: Counters) -> None:
+        """Tells everybody how the node is."""
+        self.transport.send(self.telemetry.status(self.name, state, frame, self.transport.counters, counters))
+
+
+def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shell) -> None:
+    """The life of a smart camera.
+
+    Args:
+        node: The camera.
+        source: Its pictures.
+        links: Its neighbours, and the central node if there is one.
+        shell: Its shell.
+    """
+    first = source.read(0)
+    if not shell.wait_for_start(links.neighbors + links.sinks):
+        return
+    confirmed, done = -1.0, -1
+    begun: dict[int, float] = {}
+    returning = Returning(shell.transport, links.neighbors, shell.pace)
+    index, state = 0, returning.newest()
+    while index < shell.frames:
+        # who was away goes on ahead of the others
+        if state is not None:
+            index = max(index, state.frame + LEAD)
+        if index >= shell.frames or not shell.await_frame(index):
+            index += 1
+            continue
+        image = source.read(index) if index else first
+        if state is not None:
+            node.on_return(image, state)
+        # pixels to the central node, which confirms them in lockstep
+        if links.sinks:
+            if shell.pace.kind == "lockstep":
+                confirmed = _await_confirmation(links.sinks[0], index - AHEAD, confirmed, shell)
+            shell.transport.send(PixelsMessage(node.name, index, image))
+        # local filter
+        began = time.perf_counter()
+        outgoing = node.on_frame(index, image)
+        shell.telemetry.local_filter_s.append(time.perf_counter() - began)
+        # rounds with the neighbours, and the fusion filter at their end
+        _send(outgoing, shell)
+        begun[index] = shell.began(index)
+        begun = {each: begun[each] for each in node.open_rounds}
+        _rounds(node, begun, shell, frame=index + 1)
+        shell.transport.offer(node.state)
+        if done < 0 and not shell.stopped:
+            shell.report("running", index, node.counters)
+        done = done if shell.stopped else index
+        shell.show(node, index, image)
+        index += 1
+        state = returning.missed(node, index)
+    _rounds(node, begun, shell)
+    source.close()
+    shell.report("failed" if shell.stopped else "done", done, node.counters)
+    shell.wait_for_stop()
+
+
+def _rounds(node: SmartCamera, begun: dict[int, float], shell: Shell, frame: int | None = None) -> None:
+    """Passes messages between the neighbours and the node until its frames are done.
+
+    Args:
+        node: The node.
+        begun: When its frames began, on the monotonic clock.
+        shell: Its shell.
+        frame: In real time, the frame at whose time the rounds of those before it are left for later.
+    """
+    began, rounds = time.perf_counter(), node.rounds_done
+    realtime = shell.pace.kind == "realtime"
+    while (under_way := list(node.open_rounds)) and not shell.stopped:
+        left_s = shell.begins_in_s(frame) if frame is not None and realtime else PATIENCE_S
+        if left_s <= 0:
+            break
+        for index in under_way:
+            patience_s = min(left_s, PATIENCE_S if len(under_way) == 1 else TURN_S)
+            _wait(node, index, begun[index], patience_s, shell)
+    # those of which the time is up
+    for index in list(node.open_rounds):
+        if frame is not None and index + shell.pace.lag_frames < frame:
+            shell.telemetry.late += 1
+            _send(node.on_deadline(index), shell)
+    rounds = max(node.rounds_done - rounds, 1)
+    shell.telemetry.consensus_round_s.append((time.perf_counter() - began) / rounds)
+
+
+def _wait(node: SmartCamera, index: int, begun: float, patience_s: float, shell: Shell) -> None:
+    """Waits for the messages of a frame's round, or for its end."""
+    round_ = node.open_rounds.get(index)
+    if round_ is None:
+        return
+    neighbors = node.waiting_for(index)
+    deadline = begun + shell.pace.round_deadline_s(round_)
+    left_s = max(deadline - time.monotonic(), 0.0)
+    messages = shell.transport.receive_each(neighbors, min(left_s, patience_s))
+    for message in messages:
+        if isinstance(message, ConsensusMessage):
+            _send(node.on_message(message), shell)
+        elif isinstance(message, Loss):
+            _send(node.on_loss(message), shell)
+    if len(messages) == len(neighbors):
+        return
+    # those who are gone, or late
+    silent = set(neighbors).difference(message.sender for message in messages)
+    gone = sorted(name for name in silent if not shell.transport.alive(name))
+    for name in gone:
+        _send(node.on_lost(name), shell)
+    if not gone and time.monotonic() >= deadline and node.open_rounds.get(index) == round_:
+        _send(node.on_round_deadline(index), shell)
+
+
+def _await_confirmation(sink: str, frame: int, confirmed: float, shell: Shell) -> float:
+    """Waits until the sink has confirmed a frame, or is gone; returns the last frame that it has confirmed.
+
+    A sink that misses its deadline is not waited for again: infinity.
+    """
+    limit = time.monotonic() + shell.pace.deadline_s
+    while confirmed < frame and shell.transport.alive(sink) and not shell.stopped:
+        message = shell.transport.receive(sink, PATIENCE_S)
+        if isinstance(message, ConfirmMessage):
+            confirmed = message.frame
+        elif time.monotonic() > limit:
+            return math.inf
+    return confirmed
+
+
+def run_central(node: Central, links: Links, shell: Shell) -> None:
+    """The life of the central node."""
+    if not shell.wait_for_start(node.cameras):
+        return
+    while node.frame < shell.frames and node.cameras and not shell.stopped:
+        index = node.frame
+        shell.await_frame(index)
+        # cameras that were gone and send again
+        _read(node, set(links.cameras) - node.cameras, shell)
+        deadline = shell.began(index) + shell.pace.budget_s
+        while node.frame == index and node.cameras and not shell.stopped:
+            camera = node.waiting_for[0]
+            left = deadline - time.monotonic()
+            message = shell.transport.receive(camera, min(max(left, 0.0), PATIENCE_S))
+            if isinstance(message, PixelsMessage):
+                began = time.perf_counter()
+                _send(node.on_message(message), shell)
+                if node.frame != index:
+                    shell.telemetry.local_filter_s.append(time.perf_counter() - began)
+            elif not shell.transport.alive(camera) or (left <= 0 and shell.pace.kind == "lockstep"):
+                _send(node.on_lost(camera), shell)
+                deadline = shell.began(index) + shell.pace.budget_s
+            elif left <= 0:
+                shell.telemetry.late += 1
+                # those behind the one that was waited for
+                _read(node, node.waiting_for, shell)
+                if node.frame == index:
+                    _send(node.on_deadline(), shell)
+        shell.report_now_and_then(node.frame - 1, {})
+    shell.report("done" if node.frame == shell.frames else "failed", node.frame - 1, {})
+    shell.wait_for_stop()
+
+
+def _read(node: Central, cameras: Iterable[str], shell: Shell) -> None:
+    """Takes what has come from cameras, without waiting."""
+    for camera in sorted(cameras):
+        if shell.transport.alive(camera):
+            message = shell.transport.receive(camera, 0)
+            if isinstance(message, PixelsMessage):
+                _send(node.on_message(message), shell)
+
+
+def _send(messages: Iterable[ConsensusMessage | EstimateMessage | ConfirmMessage], shell: Shell) -> None:
+    for message in messages:
+        shell.transport.send(message)

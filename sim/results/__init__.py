@@ -1,0 +1,1 @@
+"""What a run leaves: its files, its figures, and where it came from."""
