@@ -1,4 +1,4 @@
-"""A node's transport over Eclipse Zenoh: every publisher, subscriber and token of a node is declared here.
+"""A node's transport over Eclipse Zenoh: what it hears, who is there, and how it waits.
 
 ``receive`` waits in Zenoh's own channels, which is faster than callbacks but knows no time-out. What ends the
 wait is an empty message that the node puts into the channel itself: the watchdog when time is up, liveliness
@@ -10,15 +10,14 @@ import queue
 import threading
 import time
 from collections.abc import Iterable, Sequence
-from functools import partial
-from typing import Any
 
 import zenoh
-from zenoh import CongestionControl, Locality, Priority
+from zenoh import Locality
 
 from network.errors import RefusedMessage
 from network.links import sessions
 from network.links.answers import Answers
+from network.links.publishers import declare_publishers
 from network.links.transport import Links, Loss, Traffic
 from network.wire import codec, keys
 from network.wire.messages import (
@@ -31,16 +30,10 @@ from network.wire.messages import (
     PreviewMessage,
     StateMessage,
     StatusMessage,
-    TruthMessage,
 )
 
 _DEPTHS: dict[type[PeerMessage], int] = {ConsensusMessage: 64, ConfirmMessage: 64, PixelsMessage: 4}
 _KEYS = {ConsensusMessage: keys.consensus, ConfirmMessage: keys.confirm, PixelsMessage: keys.pixels}
-_ENCODINGS = {
-    kind: f"application/json;dcpf.{kind.kind}.v1"
-    for kind in (EstimateMessage, StatusMessage, ControlMessage, TruthMessage)
-}
-_PREVIEW_ENCODING = "image/jpeg"
 _WATCH_PERIOD_S = 0.01
 _WATCH_CLOSELY_S = 0.002
 """The watchdog's period while somebody waits whose time is nearly up."""
@@ -95,7 +88,8 @@ class ZenohTransport:
         self._inboxes = {sender: self._declare_inbox(sender) for sender in self._heard}
         self._declare_orders()
         self._watched = threading.Event()
-        self._publishers = self._declare_publishers(drop_late_pixels=drop_late_pixels)
+        self._publishers = declare_publishers(self._session, run, name, drop_late_pixels=drop_late_pixels)
+        self._publishers[PreviewMessage].declare_matching_listener(zenoh.handlers.Callback(self._on_watched))
         self._declare_liveliness()
         threading.Thread(target=self._watch, name="watchdog", daemon=True).start()
 
@@ -220,33 +214,6 @@ class ZenohTransport:
     def _on_order(self, sample: zenoh.Sample) -> None:
         self._orders.put(sample.payload.to_bytes())
 
-    def _declare_publishers(self, *, drop_late_pixels: bool) -> dict[type, zenoh.Publisher]:
-        run, name = self._run, self._name
-        publish = partial(self._session.declare_publisher, allowed_destination=Locality.REMOTE)
-        rounds = partial(
-            publish, congestion_control=CongestionControl.BLOCK, priority=Priority.REAL_TIME, express=True
-        )
-        public = partial(publish, congestion_control=CongestionControl.BLOCK)
-        pixels_control = CongestionControl.DROP if drop_late_pixels else CongestionControl.BLOCK
-        # Whoever looks too slowly misses pictures and holds nobody up.
-        preview = publish(
-            keys.preview(run, name),
-            encoding=_PREVIEW_ENCODING,
-            congestion_control=CongestionControl.DROP,
-            priority=Priority.DATA_LOW,
-        )
-        preview.declare_matching_listener(zenoh.handlers.Callback(self._on_watched))
-        return {
-            ConsensusMessage: rounds(keys.consensus(run, name)),
-            ConfirmMessage: rounds(keys.confirm(run, name)),
-            PixelsMessage: publish(
-                keys.pixels(run, name), congestion_control=pixels_control, priority=Priority.DATA_LOW
-            ),
-            EstimateMessage: public(keys.estimate(run, name), encoding=_ENCODINGS[EstimateMessage]),
-            StatusMessage: public(keys.status(run, name), encoding=_ENCODINGS[StatusMessage]),
-            PreviewMessage: preview,
-        }
-
     def _on_watched(self, status: zenoh.MatchingStatus) -> None:
         if status.matching:
             self._watched.set()
@@ -298,33 +265,3 @@ class ZenohTransport:
                 self._session.put(
                     self._inbox_keys[sender], _WAKE_UP, allowed_destination=Locality.SESSION_LOCAL
                 )
-
-
-def has_listeners(publisher: zenoh.Publisher) -> bool:
-    """Whether anybody subscribes to what a publisher publishes."""
-    status: Any = publisher.matching_status  # not a bool, whatever Zenoh's types say: always true as one
-    return bool(status.matching)
-
-
-def publish_again(session: zenoh.Session, key: str, data: bytes) -> None:
-    """Publishes what was told in a run, byte for byte, from outside the nodes."""
-    _, _, kind = key.rpartition("/")
-    picture = kind == PreviewMessage.kind
-    session.put(
-        key,
-        data,
-        encoding=_PREVIEW_ENCODING if picture else f"application/json;dcpf.{kind}.v1",
-        congestion_control=CongestionControl.DROP if picture else CongestionControl.BLOCK,
-        priority=Priority.DATA_LOW if picture else Priority.DATA,
-    )
-
-
-def publish(session: zenoh.Session, run: str, message: ControlMessage | TruthMessage) -> None:
-    """Publishes a message about a whole run, from outside the nodes."""
-    key = keys.control(run) if isinstance(message, ControlMessage) else keys.truth(run)
-    session.put(
-        key,
-        codec.encode_public(message),
-        encoding=_ENCODINGS[type(message)],
-        congestion_control=CongestionControl.BLOCK,
-    )

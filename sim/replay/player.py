@@ -11,7 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 import zenoh
 
 from network.links import sessions
-from network.links.zenoh import has_listeners, publish_again
+from network.links.publishers import has_listeners, publish_again
 from network.wire import keys
 from network.wire.messages import PreviewMessage
 from sim.replay.playback import Playback

@@ -12,7 +12,7 @@ import zenoh
 
 from network.errors import RefusedMessage
 from network.links import sessions
-from network.links.zenoh import publish
+from network.links.publishers import publish
 from network.wire import codec, keys
 from network.wire.messages import ControlMessage, EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
 from sim.assembly import Assembly

@@ -19,9 +19,10 @@ from network.errors import NetworkError
 from network.graphs import graph
 from network.links import sessions
 from network.links.memory import MemoryNetwork
+from network.links.publishers import publish
 from network.links.runtime import RUNTIME_ENVIRONMENT
 from network.links.transport import Links, links_of
-from network.links.zenoh import ZenohTransport, publish
+from network.links.zenoh import ZenohTransport
 from network.rounds.consensus import Consensus
 from network.streams import stream
 from network.wire import codec, keys

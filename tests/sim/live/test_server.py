@@ -14,8 +14,9 @@ from websockets.sync.client import connect
 
 from network.errors import NetworkError
 from network.links import sessions
+from network.links.publishers import publish
 from network.links.transport import Links
-from network.links.zenoh import ZenohTransport, publish
+from network.links.zenoh import ZenohTransport
 from network.wire import codec, keys
 from network.wire.messages import ControlMessage, PreviewMessage, StatusMessage, TruthMessage
 from nodes.shell.preview import encode_jpeg
