@@ -1,6 +1,6 @@
 """What is published over Eclipse Zenoh, and how: by a node, and from outside about a whole run.
 
-Messages of the rounds go first and block; public ones block; pixels and previews give way to all others, and are
+Messages of the rounds go first and block; public ones block; pixels and previews give way to all others and are
 dropped where whoever wants them is too slow.
 """
 
