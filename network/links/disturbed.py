@@ -2,7 +2,8 @@
 
 The channels are those of runs in one process, with the same draws for the same messages. In real time they go
 by the clock. In lockstep time does not count: whoever is late is waited for, and what is lost is known to be
-so at once. Nobody waits for a deadline, and a run has the numbers of one in virtual time.
+so at once. Nobody waits for a deadline, and a run has the numbers of one in virtual time in which no message
+comes after its round's.
 """
 
 import time
