@@ -33,10 +33,11 @@ def membership(
     }
     events: list[dict[str, Any]] = []
     for camera in cameras:
-        told = statuses[camera].counters.get("knocked") if camera in statuses else None
-        if isinstance(told, Mapping) and told:
+        knocked = statuses[camera].counters.get("knocked") if camera in statuses else None
+        # a status comes over the network: what is in it need not be ours
+        if isinstance(knocked, Mapping) and knocked.keys() >= {"first", "frames"}:
             events.append(
-                {"frame": told["first"], "event": "knocked", "node": camera, "frames": told["frames"]}
+                {"frame": knocked["first"], "event": "knocked", "node": camera, "frames": knocked["frames"]}
             )
         there = True
         for frame in range(frames):
