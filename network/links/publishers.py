@@ -1,7 +1,7 @@
 """What is published over Eclipse Zenoh, and how: by a node, and from outside about a whole run.
 
-Messages of the rounds go first and block; public ones block; pixels and previews give way to all others and are
-dropped where whoever wants them is too slow.
+Messages of the rounds go first and block; public ones block; pixels and previews give way to all others, and
+previews, in real time pixels as well, are dropped where whoever wants them is too slow.
 """
 
 from functools import partial
