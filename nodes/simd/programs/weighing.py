@@ -17,8 +17,6 @@ from nodes.simd.memory import Word
 from nodes.simd.options import SimdOptions
 from nodes.simd.programs.arithmetic import exponential, square_root
 
-WEIGHTS = "Particle weights"
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
