@@ -35,6 +35,8 @@ SCENARIO = "scenario.json"
 """Of the attachment: the scenario as run, everything resolved."""
 CHUNK_BYTES = 32 * 1024
 """Every picture of some size ends a chunk."""
+GONE = ("lost", "left", "died", "killed", "silent", "stuck")
+"""Events after which a node is not there; who has been knocked, or is refused a message, still is."""
 
 Filmed = EstimateMessage | TruthMessage | StatusMessage | PreviewMessage
 
@@ -107,7 +109,7 @@ class McapFilm:
 
     def event(self, event: str, node: str, details: dict[str, Any]) -> None:
         """Records that something happened to a node: its coming and going, and whatever else for the log."""
-        gone = event != "seen"
+        gone = event in GONE
         if event in ("seen", "lost"):
             key = keys.alive(self.assembly.scenario.name, node)
             if key not in self._channels:
@@ -117,7 +119,7 @@ class McapFilm:
             ids = [f"{estimator}/{node}" for estimator in ("dcpf", "cpf", "single")]
             self._show("/scene", scene.without(ids, self._now_s), self._now_s)
         words = " ".join([f"{node}: {event}", *(f"{name}={value}" for name, value in details.items())])
-        self._show("/log", foxglove.log(node, words, self._now_s, warning=gone), self._now_s)
+        self._show("/log", foxglove.log(node, words, self._now_s, warning=event != "seen"), self._now_s)
 
     def close(self) -> None:
         """Writes the index and closes the file."""

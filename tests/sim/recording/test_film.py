@@ -193,6 +193,18 @@ def test_a_camera_that_tracks_in_its_image_plane_has_no_place_in_the_world(tmp_p
     assert len(found["/C1/boxes/dcpf"]) == 3
 
 
+def test_a_camera_that_was_knocked_stays_in_the_scene(small, tmp_path):
+    assembly = Assembly(load_scenario(small, []))
+    film = McapFilm(tmp_path / "run.mcap", assembly)
+    film.event("knocked", "B", {"frame": 2, "frames": 3})
+    film.event("lost", "C", {"frame": 3})
+    film.close()
+    found, _ = read(tmp_path / "run.mcap")
+    gone = {each.id for _, update in found["/scene"] for each in update.deletions}
+    assert gone == {"dcpf/C", "cpf/C", "single/C"}
+    assert next(line.message for _, line in found["/log"]) == "B: knocked frame=2 frames=3"
+
+
 def test_a_film_of_an_earlier_run_does_not_stay(recorded):
     run = recorded()
     assert run.film.exists()
