@@ -57,7 +57,7 @@ class GridSamples:
         pixels = np.stack([inside_x * inside_y[rows].sum(axis=0) for rows in self.parts])
         # Samples outside fall on a border one pixel wide, of a colour that nobody tells apart.
         bordered = [_bordered(channel, book.codes.shape[2]) for channel in bins]
-        index = ((y * (width + 2))[:, None] + x).reshape(-1, n_boxes)
+        index = ((y * (width + 2))[:, None] + x).reshape(len(y) * n_columns, n_boxes)
         counts = np.zeros((len(book.part), n_boxes), dtype=np.intp)
         for block in book.blocks:
             rows = self.parts[block.part]

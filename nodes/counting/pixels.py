@@ -68,7 +68,7 @@ class PixelBoxes:
         # one row more, for places that no code has
         counts = np.zeros((n_codes + 1, sides.shape[1]), np.int32)
         for part, rows in enumerate(self.rows):
-            if rows.first >= rows.last:
+            if rows.first >= rows.last or not pixels.size:
                 continue
             of_part = bins[:, rows.first - self.region[1] : rows.last - self.region[1]]
             if n_channels == 1:

@@ -131,6 +131,17 @@ def test_counts_do_not_depend_on_the_region_that_was_cut_out(seed, left, top, ev
     np.testing.assert_array_equal(whole[1], region[1])
 
 
+@pytest.mark.parametrize("every_pixel", [False, True])
+@pytest.mark.parametrize("n_bins", [0, 8])
+def test_no_boxes_and_no_colours_are_counted_like_any(n_bins, every_pixel):
+    used = np.zeros((1, 3, 8), bool)
+    used[..., :n_bins] = True
+    bins = random_bins(np.random.default_rng(0), 3, 8)
+    sampling = EVERY_PIXEL if every_pixel else SamplingOptions(grid=(3, 3))
+    counts, pixels = count(bins, BOXES[:0], codebook(used, (1.0,)), sampling)
+    assert (counts.shape, pixels.shape) == ((0, 3 * n_bins), (0, 1))
+
+
 def test_a_codebook_numbers_the_used_bins_in_order():
     used = np.array([[[True, False, True]], [[False, False, True]]])
     book = codebook(used, (0.4, 0.6))

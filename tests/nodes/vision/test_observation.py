@@ -102,6 +102,16 @@ def test_no_reference_is_taken_of_a_target_at_the_border():
     assert model.first_appearance(model.look(paint(HERE)), OUTSIDE) is None
 
 
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+def test_a_target_that_fills_the_picture_has_a_reference_too(options):
+    target = TargetOptions(space="image", size_px=(150.0, 115.0))
+    model = ObservationModel(CAMERA, target, options)
+    found = model.first_appearance(model.look(paint(None)), np.array([79.5, 59.5]))
+    # nothing is seen of what surrounds it: the fixed constants serve
+    assert found.miss_distance == options.likelihood.miss_distance
+    assert found.variance == options.likelihood.sigma**2
+
+
 def test_a_uniform_scene_has_a_likelihood_too():
     model, _ = ready(OPTIONS["joint"])
     picture = model.look(np.full((120, 160, 3), 77, np.uint8))
