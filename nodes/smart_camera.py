@@ -28,6 +28,7 @@ from nodes.shell.telemetry import Counters
 from nodes.simd.report import FrameReport
 from nodes.vision.appearance import Appearance, pack_looks, settled, unpack_looks
 from nodes.vision.observation import ObservationModel, Picture
+from nodes.vision.standstill import Standstill
 
 Outgoing = tuple[ConsensusMessage | EstimateMessage, ...]
 
@@ -65,8 +66,7 @@ class SmartCamera:
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
         self._image: UInt8[np.ndarray, "H W 3"] | None = None
-        self._stood = False  # whether a picture was like the first one
-        self._knocked: dict[str, int] = {}  # in how many `frames`, and the `first` of them
+        self._standstill = Standstill()
         self._estimate = setup.start.moments
         self._frames: dict[int, FrameInProgress] = {}
         self._last_frame = 0
@@ -192,7 +192,7 @@ class SmartCamera:
         return {
             **self._indefinite,
             "unused": self._rounds.counters,
-            "knocked": self._knocked,
+            "knocked": self._standstill.knocked,
             **({"simd": report.figures} if report else {}),
         }
 
@@ -214,14 +214,8 @@ class SmartCamera:
 
     def _is_usable(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> bool:
         """Whether a picture tells anything: a camera that hangs, or that was knocked, is as good as blind."""
-        still = self._model.stands_still(image)
-        # what has never looked like the first picture, as where that was black, cannot tell
-        self._stood |= still
-        if self._stood and not still:
-            first, frames = self._knocked.get("first", index), self._knocked.get("frames", 0)
-            self._knocked = {"frames": frames + 1, "first": first}
-            return False
-        return is_new(image, self._image)
+        stands = self._standstill.holds(index, like_the_first=self._model.stands_still(image))
+        return stands and is_new(image, self._image)
 
     def _predict(self, index: int) -> tuple[Particles, Particles]:
         """The particles of the last frame that is done, moved to the frame before this one, and to it."""

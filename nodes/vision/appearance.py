@@ -144,6 +144,7 @@ def unpack_looks(average: Float[np.ndarray, " K"], options: ColorOptions) -> App
     # Σ seen / Σ 1: the ratio is a weighted mean even where consensus is not complete
     mean = average / share
     shape = (2, len(options.parts), options.n_channels, options.n_bins)
-    histograms, distinct = mean[:-3].reshape(shape)
+    # an average that is not reached yet can lie beside all that was averaged, and below 0
+    histograms, distinct = np.maximum(mean[:-3], 0.0).reshape(shape)
     distinctness = np.divide(distinct, histograms, out=np.zeros_like(distinct), where=histograms > 0)
     return Appearance(histograms, histograms, distinctness, float(mean[-3]), float(mean[-2]), own=False)

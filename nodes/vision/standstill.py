@@ -52,6 +52,35 @@ def likeness(image: UInt8[np.ndarray, "H W 3"], background: Background) -> float
     return float(np.median((product / np.sqrt(energy))[background.textured]))
 
 
+class Standstill:
+    """Whether one camera has been knocked, over its frames.
+
+    Attributes:
+        knocked: In how many `frames`, and the `first` of them; empty if in none.
+    """
+
+    def __init__(self) -> None:
+        self.knocked: dict[str, int] = {}
+        self._stood = False
+
+    def holds(self, frame: int, *, like_the_first: bool) -> bool:
+        """Whether the camera looks where it should in a frame.
+
+        Args:
+            frame: The frame.
+            like_the_first: Whether its picture is like the first one. Where none has ever been, as where that
+                was black, nothing can be told.
+        """
+        self._stood |= like_the_first
+        if like_the_first or not self._stood:
+            return True
+        self.knocked = {
+            "frames": self.knocked.get("frames", 0) + 1,
+            "first": self.knocked.get("first", frame),
+        }
+        return False
+
+
 def _structure(image: UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "h w"]:
     step = max(1, len(image) // ROWS)
     # green is nearly what is bright

@@ -97,16 +97,16 @@ def compare(
     try:
         compute_missing(plan, store, engine, done, partial(progress_bar, "parts of runs"))
     finally:
-        # However it ends, the page shows what is there.
+        # However it ends, the page shows what is there; what is whole has its files first.
         findings = findings_of(plan, done)
         verdicts = judge(findings)
-        if findings.groups:
-            with _writing(results):
+        found = report(findings, verdicts)
+        with _writing(results):
+            if not any(findings.missing.values()):
+                write_files(findings, found, verdicts, results)
+                write_figures(findings, results)
+            if findings.groups:
                 write_page(experiment_report(findings, verdicts), results / FILE)
-    found = report(findings, verdicts)
-    with _writing(results):
-        write_files(findings, found, verdicts, results)
-        write_figures(findings, results)
     if as_json:
         sys.stdout.write(json.dumps(found) + "\n")
     else:

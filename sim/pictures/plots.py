@@ -14,7 +14,7 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import LogLocator, NullLocator
 
 from sim.assembly import Assembly
-from sim.pictures.ground import Area, area_of, coverage, heading, height_of_target
+from sim.pictures.ground import Area, coverage, heading, height_of_target
 from sim.pictures.theme import COLORS, FAINT, INK, LABELS, MUTED, SEEN
 from sim.results.results import Results
 
@@ -57,31 +57,6 @@ def plot_errors(results: Results) -> Figure:
         # a logarithm would give much of the figure to the few frames that happen to be exact
         axes.set_ylim(bottom=float(np.percentile(fused[fused > 0], 2)))
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
-    return figure
-
-
-def plot_trajectories(results: Results, assembly: Assembly) -> Figure:
-    """The ground from above with cameras, communication graph and paths, and the height in a volume.
-
-    Args:
-        results: The run.
-        assembly: Its scenario, put together.
-    """
-    is_volume = assembly.scenario.target.space == "volume"
-    area = area_of(results, assembly)
-    width = 6.5
-    height = width * float(np.clip(area.size[1] / area.size[0], 0.4, 1.6)) + (2.4 if is_volume else 0.8)
-    figure = Figure(figsize=(width, height), layout="constrained")
-    rows = figure.add_gridspec(2, 1, height_ratios=[3, 1]) if is_volume else figure.add_gridspec(1, 1)
-    axes = cleaned(figure.add_subplot(rows[0]))
-    draw_ground(axes, results, assembly, area)
-    draw_paths(axes, results)
-    axes.set(xlabel="x / m", ylabel="y / m", title=results.scenario.name, aspect="equal")
-    axes.set(xlim=(area.low[0], area.high[0]), ylim=(area.low[1], area.high[1]))
-    if is_volume:
-        below = cleaned(figure.add_subplot(rows[1]))
-        draw_heights(below, results)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
     return figure
 
 

@@ -20,8 +20,8 @@ from sim.pictures.clip import make_clip, tile
 from sim.pictures.comparison import plot_comparison
 from sim.pictures.ground_map import GroundMap
 from sim.pictures.overlay import draw_frame
-from sim.pictures.plots import plot_errors, plot_trajectories, write_figure
-from sim.pictures.theme import COLORS, LABELS
+from sim.pictures.plots import plot_errors, write_figure
+from sim.pictures.theme import COLORS
 from sim.results.results import Results
 from sim.scenario.model import Scenario
 from sim.world.colors import bgr
@@ -324,17 +324,6 @@ def test_the_figure_of_errors_has_each_estimator():
 def test_errors_without_a_truth_cannot_be_plotted():
     with pytest.raises(ValueError, match="square has no truth"):
         plot_errors(run(truth=False)[0])
-
-
-@pytest.mark.parametrize(("space", "n_axes"), [("plane", 1), ("volume", 2)])
-def test_the_figure_of_paths_has_metres_and_names(space, n_axes):
-    figure = plot_trajectories(*run(space))
-    assert len(figure.axes) == n_axes
-    axes = figure.axes[0]
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x / m", "y / m")
-    assert {text.get_text() for text in axes.texts} == {"C1", "C2", "C3"}
-    (legend,) = figure.legends
-    assert {text.get_text() for text in legend.get_texts()} == set(LABELS.values())
 
 
 def summary(name, seed, dcpf, *, lost=False):

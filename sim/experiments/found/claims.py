@@ -69,6 +69,8 @@ def _measure(claim: Claim, groups: Sequence[GroupFindings]) -> Found:
 
 def _flat(groups: Sequence[GroupFindings]) -> Found:
     key, unit = groups[0].group.settings[0][0], groups[0].unit
+    if len({group.node_rmse("single").shape[1] for group in groups}) > 1:
+        return None, f"over {key}, the cameras are not the same ones: a single one cannot be followed.", []
     ours = _range([float(group.rmse("dcpf").mean()) for group in groups])
     best = _range([float(group.rmse("single").mean()) for group in groups])
     each = np.array([group.node_rmse("single").mean(axis=0) for group in groups])

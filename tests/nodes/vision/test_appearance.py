@@ -213,6 +213,14 @@ def test_a_blind_camera_is_told_the_mean_of_those_that_saw(seed, n_seeing, n_bli
     assert not told.own
 
 
+def test_an_average_that_is_beside_all_that_was_seen_is_still_a_description():
+    looks = pack_looks(appearance_of(np.full((1, 1, 8), 0.125)), JOINT)
+    looks[:3] = looks[8] = -1e-3
+    told = unpack_looks(looks, JOINT)
+    assert told.histograms.min() == told.distinctness.min() == 0
+    assert np.isfinite(distance_to(told.histograms, told, JOINT))
+
+
 def test_nobody_saw_anything():
     assert unpack_looks(pack_looks(None, PARTS), PARTS) is None
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nodes.vision.standstill import BLOCK, ROWS, background_of, likeness
+from nodes.vision.standstill import BLOCK, ROWS, Standstill, background_of, likeness
 
 
 @pytest.fixture
@@ -55,3 +55,15 @@ def test_each_block_is_correlated_as_by_hand(wall):
     correlations, energies = np.array(found).T
     expected = np.median(correlations[energies >= np.median(energies)])
     assert likeness(mixed, background) == pytest.approx(expected, abs=1e-4)
+
+
+def test_who_was_knocked_is_told_until_it_looks_there_again():
+    standstill = Standstill()
+    like = [False, True, False, False, True]
+    # the first picture may have been black: who has never looked like it cannot have been knocked
+    assert [standstill.holds(i + 1, like_the_first=each) for i, each in enumerate(like)] == [
+        *(True, True),
+        *(False, False),
+        True,
+    ]
+    assert standstill.knocked == {"frames": 2, "first": 3}

@@ -72,7 +72,7 @@ def track(error):
 def found(small, claim, errors, *, runs=3, disagreement=0.0, indefinite=0.0):
     """Findings of one study over t and n.
 
-    `errors(t, n, seed)` gives those of DCPF, CPF and two single cameras, always or frame by frame.
+    `errors(t, n, seed)` gives those of DCPF, CPF and one or two single cameras, always or frame by frame.
     """
     study = {
         "sweep": {"network.iterations": ["1", "12"], "filter.n_particles": ["300", "500"]},
@@ -89,8 +89,9 @@ def found(small, claim, errors, *, runs=3, disagreement=0.0, indefinite=0.0):
         t, n = (float(value) for _, value in group.settings)
         results = []
         for seed in group.seeds:
-            dcpf, cpf, first, second = errors(t, n, seed)
-            tracks = {"dcpf/A": track(dcpf), "single/A": track(first), "single/B": track(second)}
+            dcpf, cpf, *singles = errors(t, n, seed)
+            tracks = {"dcpf/A": track(dcpf)}
+            tracks |= {f"single/{name}": track(each) for name, each in zip("AB", singles, strict=False)}
             cameras = {"tracks": tracks, "truth": truth, "summary": summary}
             results.append({"cameras": cameras, "central": {"tracks": {"cpf/c": track(cpf)}, "truth": truth}})
         groups.append(GroupFindings(group, results))

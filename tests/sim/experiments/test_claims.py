@@ -34,6 +34,13 @@ def test_flat_is_a_quarter_of_what_single_cameras_change(small, step, holds):
     assert verdict(small, {"kind": "flat"}, errors).holds is holds
 
 
+def test_flat_follows_single_cameras_and_needs_them_to_stay(small):
+    told = verdict(small, {"kind": "flat"}, lambda t, _n, _s: (0.1, 0.1, 0.5, *[0.4] * (t == 1)))
+
+    assert told.holds is None
+    assert "the cameras are not the same ones" in told.text
+
+
 @pytest.mark.parametrize(("factor", "holds"), [(1.0, True), (1.049, True), (1.06, False)])
 def test_within_looks_from_a_value_on(small, factor, holds):
     told = verdict(
