@@ -77,6 +77,7 @@ def compare(
     from sim.experiments.computing.store import Store
     from sim.experiments.found.claims import judge
     from sim.experiments.found.reporting import report, write_files
+    from sim.experiments.found.shown import fingerprint, is_shown
     from sim.experiments.run import compute_missing, findings_of
     from sim.pictures.experiment import write_figures
     from sim.report.experiment import experiment_report
@@ -101,12 +102,13 @@ def compare(
         findings = findings_of(plan, done)
         verdicts = judge(findings)
         found = report(findings, verdicts)
-        with _writing(results):
-            if not any(findings.missing.values()):
-                write_files(findings, found, verdicts, results)
-                write_figures(findings, results)
-            if findings.groups:
-                write_page(experiment_report(findings, verdicts), results / FILE)
+        mark = fingerprint(found)
+        if findings.groups and not is_shown(results / FILE, mark):
+            with _writing(results):
+                if not any(findings.missing.values()):
+                    write_files(findings, found, verdicts, results)
+                    write_figures(findings, results)
+                write_page(experiment_report(findings, verdicts, mark), results / FILE)
     if as_json:
         sys.stdout.write(json.dumps(found) + "\n")
     else:

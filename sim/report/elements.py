@@ -153,6 +153,7 @@ class ExperimentReport:
         worlds: Where it takes place.
         studies: What was found.
         runs: One run of each scenario that some study has as it is; else of each.
+        fingerprint: What the page is known by.
     """
 
     name: str
@@ -162,3 +163,4 @@ class ExperimentReport:
     worlds: Sequence[Plot]
     studies: Sequence[StudyReport]
     runs: Sequence[ShownRun]
+    fingerprint: str

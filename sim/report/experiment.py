@@ -31,12 +31,13 @@ _CAPTIONS: Mapping[str, str] = {
 _ESTIMATORS = {"dcpf": "DCPF", "cpf": "CPF", "best single": "best single camera", "cpf jpeg": "CPF, JPEG"}
 
 
-def experiment_report(findings: Findings, verdicts: Sequence[Verdict]) -> ExperimentReport:
+def experiment_report(findings: Findings, verdicts: Sequence[Verdict], mark: str) -> ExperimentReport:
     """What the page of an experiment shows.
 
     Args:
         findings: What it has found, whole or not.
         verdicts: Its claims, held against that.
+        mark: What the page will be known by.
     """
     names = list(dict.fromkeys(each.group.study for each in findings.groups))
     plain = plainest(findings)
@@ -51,6 +52,7 @@ def experiment_report(findings: Findings, verdicts: Sequence[Verdict]) -> Experi
         runs=[]
         if any(findings.missing.values())
         else shown_runs([each for each in plain if not each.settings] or plain),
+        fingerprint=mark,
     )
 
 

@@ -6,6 +6,7 @@ pictures and nothing else. So CPF is not run again for every graph, and what has
 
 import hashlib
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -22,7 +23,6 @@ Kind = Literal["cameras", "central", "coded"]
 """The cameras with their network; the central node on raw pictures; the same on pictures sent as JPEG."""
 
 _PACKAGES = ("network", "nodes", "sim")
-_SOURCES = {".py", ".c"}
 _NO_NUMBERS = ("sim/commands", "sim/pictures", "sim/report", "sim/experiments")
 
 
@@ -70,13 +70,33 @@ def central_part(scenario: Scenario, jpeg_quality: int | None = None) -> Part:
 @cache
 def code_version() -> str:
     """A hash of everything that numbers come from: this program's source, and what it calculates with."""
+    return _hash_of(
+        [
+            path
+            for path, name in _files(".py", ".c")
+            if not name.startswith(_NO_NUMBERS) or name.startswith("sim/experiments/computing")
+        ]
+    )
+
+
+@cache
+def program_version() -> str:
+    """A hash of the whole program, with what it draws by."""
+    return _hash_of([path for path, _ in _files(".py", ".c", ".html", ".css")])
+
+
+def _files(*endings: str) -> list[tuple[Path, str]]:
+    """The program's files with their names from its root, sorted."""
+    root = Path(sim.__file__).parents[1]
+    paths = (path for package in _PACKAGES for path in (root / package).rglob("*.*"))
+    return sorted((path, path.relative_to(root).as_posix()) for path in paths if path.suffix in endings)
+
+
+def _hash_of(paths: Iterable[Path]) -> str:
     root = Path(sim.__file__).parents[1]
     digest = hashlib.sha256()
-    sources = [path for package in _PACKAGES for path in (root / package).rglob("*.*")]
-    for path in sorted(path for path in sources if path.suffix in _SOURCES):
-        name = path.relative_to(root).as_posix()
-        if not name.startswith(_NO_NUMBERS) or name.startswith("sim/experiments/computing"):
-            digest.update(f"{name}\0".encode() + path.read_bytes())
+    for path in paths:
+        digest.update(f"{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes())
     digest.update(f"numpy {np.__version__}, opencv {cv2.__version__}".encode())
     return digest.hexdigest()
 

@@ -80,6 +80,25 @@ def test_what_is_finished_is_not_computed_again(compare, small, monkeypatch):
     assert files(Path("out")) == before
 
 
+def test_a_page_that_shows_it_all_is_not_drawn_again(compare, small):
+    def times():
+        return {path.name: path.stat().st_mtime_ns for path in Path("out").iterdir() if path.is_file()}
+
+    first = compare(small, *SWEEP, "--jobs", 1, "--out", "out", "--json")
+    before = times()
+
+    second = compare(small, *SWEEP, "--jobs", 1, "--out", "out", "--json")
+
+    assert second.stdout == first.stdout
+    assert times() == before
+    # other figures, or no page: all is drawn
+    compare(small, *SWEEP, "--runs", 1, "--jobs", 1, "--out", "out")
+    assert all(drawn > before[name] for name, drawn in times().items())
+    Path("out/report.html").unlink()
+    compare(small, *SWEEP, "--runs", 1, "--jobs", 1, "--out", "out")
+    assert Path("out/report.html").exists()
+
+
 def test_parts_are_shared_between_settings_that_they_do_not_depend_on(compare, small):
     compare(small, *SWEEP, "--jobs", 1, "--out", "out")
 
