@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from network.links.transport import Loss
+from network.links.transport import LostMessage
 from network.rounds.consensus import Consensus
 from network.wire.messages import ConsensusMessage
 
@@ -64,10 +64,10 @@ class Rounds:
         self._silent.update(self.of(frame).waiting_for())
         return self.of(frame).expire() + self._lose_the_silent()
 
-    def miss(self, loss: Loss) -> Outgoing:
+    def miss(self, lost: LostMessage) -> Outgoing:
         """Does a round without a message that is lost; its sender has been silent for one more."""
-        self._silent[loss.sender] += loss.sender not in self.gone
-        return self.of(loss.frame).miss(loss.sender, loss.frame, loss.round) + self._lose_the_silent()
+        self._silent[lost.sender] += lost.sender not in self.gone
+        return self.of(lost.frame).miss(lost.sender, lost.frame, lost.round) + self._lose_the_silent()
 
     def cut(self) -> None:
         """Ends the rounds of all frames."""

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from network.links.transport import Loss
+from network.links.transport import LostMessage
 from network.rounds.consensus import Consensus
 from network.wire.messages import ConsensusMessage, EstimateMessage, PreviewMessage, StateMessage
 from nodes.estimators.array_estimator import ArrayEstimator
@@ -103,9 +103,9 @@ class SmartCamera:
         """A neighbour's value of a round has come; one that was gone is counted on again."""
         return self._with_result(self._rounds.receive(message))
 
-    def on_loss(self, loss: Loss) -> Outgoing:
+    def on_lost_message(self, lost: LostMessage) -> Outgoing:
         """A neighbour's value of a round is lost: nobody waits for it."""
-        return self._with_result(self._rounds.miss(loss))
+        return self._with_result(self._rounds.miss(lost))
 
     def on_return(self, image: UInt8[np.ndarray, "H W 3"], state: StateMessage) -> None:
         """The camera was away: it goes on with what a neighbour knows.

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 
 from network.links.conditions import NS, Channel
-from network.links.transport import Links, Loss
+from network.links.transport import Links, LostMessage
 from network.links.zenoh import ZenohTransport
 from network.wire import codec
 from network.wire.messages import ConsensusMessage, PeerMessage
@@ -55,7 +55,7 @@ class DisturbedTransport(ZenohTransport):
         self._now_ns = dict.fromkeys(channels, 0)
         self._due: dict[str, deque[tuple[int, ConsensusMessage]]] = {sender: deque() for sender in channels}
 
-    def receive(self, sender: str, timeout_s: float) -> PeerMessage | Loss | None:
+    def receive(self, sender: str, timeout_s: float) -> PeerMessage | LostMessage | None:
         """The next message of a linked node that its channel has let through by now."""
         if sender not in self._channels:
             return super().receive(sender, timeout_s)
@@ -73,13 +73,13 @@ class DisturbedTransport(ZenohTransport):
                 return None
             time.sleep(min(left_s, _LOOK_S))
 
-    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | Loss, ...]:
+    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | LostMessage, ...]:
         """The next message of each of several linked nodes that its channel has let through by now."""
         deadline = time.monotonic() + timeout_s
         came = [self.receive(sender, max(deadline - time.monotonic(), 0.0)) for sender in senders]
         return tuple([message for message in came if message is not None])
 
-    def _receive_in_lockstep(self, sender: str, timeout_s: float) -> PeerMessage | Loss | None:
+    def _receive_in_lockstep(self, sender: str, timeout_s: float) -> PeerMessage | LostMessage | None:
         due = self._due[sender]
         if not due:
             message = super().receive(sender, timeout_s)
@@ -87,7 +87,7 @@ class DisturbedTransport(ZenohTransport):
                 return message
             self._now_ns[sender] += _FREE_NS
             if not self._carry(sender, message, self._now_ns[sender]):
-                return Loss(sender, message.frame, message.round)
+                return LostMessage(sender, message.frame, message.round)
         return due.popleft()[1]
 
     def _carry(self, sender: str, message: ConsensusMessage, now_ns: int) -> int:

@@ -106,7 +106,7 @@ class Traffic:
 
 
 @dataclass(frozen=True, slots=True)
-class Loss:
+class LostMessage:
     """A message of the rounds that is known to be lost: nobody need wait for it.
 
     Attributes:
@@ -149,7 +149,7 @@ class Transport(Protocol):
     def send(self, message: PeerMessage | EstimateMessage | StatusMessage | PreviewMessage) -> None:
         """Sends a message of this node to whom it concerns."""
 
-    def receive(self, sender: str, timeout_s: float) -> PeerMessage | Loss | None:
+    def receive(self, sender: str, timeout_s: float) -> PeerMessage | LostMessage | None:
         """The next valid message of one of the nodes that are linked to this one.
 
         Args:
@@ -160,7 +160,7 @@ class Transport(Protocol):
             Its message, that it was lost where that is known, None when time is up or the sender is gone.
         """
 
-    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | Loss, ...]:
+    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | LostMessage, ...]:
         """The next message of each of several nodes that are linked to this one.
 
         All are read when the last one is there. Who reads each as it comes is woken for every one, and finds

@@ -18,7 +18,7 @@ from network.errors import RefusedMessage
 from network.links import sessions
 from network.links.answers import Answers
 from network.links.publishers import declare_publishers
-from network.links.transport import Links, Loss, Traffic
+from network.links.transport import Links, LostMessage, Traffic
 from network.wire import codec, keys
 from network.wire.messages import (
     ConfirmMessage,
@@ -142,7 +142,7 @@ class ZenohTransport:
                 self._answers.keep(str(publisher.key_expr), data)
         publisher.put(data)
 
-    def receive(self, sender: str, timeout_s: float) -> PeerMessage | Loss | None:
+    def receive(self, sender: str, timeout_s: float) -> PeerMessage | LostMessage | None:
         """The next valid message of a linked node, None when time is up or the sender is gone."""
         deadline = time.monotonic() + timeout_s
         while (data := self._next(sender, deadline)) is not None:
@@ -151,7 +151,7 @@ class ZenohTransport:
                 return message
         return None
 
-    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | Loss, ...]:
+    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | LostMessage, ...]:
         """The next message of each of several linked nodes, but of those that are gone, silent or refused."""
         deadline = time.monotonic() + timeout_s
         came = [(sender, self._next(sender, deadline)) for sender in senders]

@@ -11,7 +11,7 @@ from threading import Event
 import numpy as np
 from jaxtyping import UInt8
 
-from network.links.transport import Links, Loss, Transport
+from network.links.transport import Links, LostMessage, Transport
 from network.wire.messages import (
     ConfirmMessage,
     ConsensusMessage,
@@ -228,8 +228,8 @@ def _wait(node: SmartCamera, index: int, begun: float, patience_s: float, shell:
     for message in messages:
         if isinstance(message, ConsensusMessage):
             _send(node.on_message(message), shell)
-        elif isinstance(message, Loss):
-            _send(node.on_loss(message), shell)
+        elif isinstance(message, LostMessage):
+            _send(node.on_lost_message(message), shell)
     if len(messages) == len(neighbors):
         return
     # those who are gone, or late

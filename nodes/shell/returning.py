@@ -9,7 +9,7 @@ some are, the network was in parts, and those that are ahead wait.
 import time
 from collections.abc import Iterable
 
-from network.links.transport import Loss, Transport
+from network.links.transport import LostMessage, Transport
 from network.wire.messages import ConsensusMessage, StateMessage
 from nodes.shell.pace import Pace
 from nodes.smart_camera import SmartCamera
@@ -58,8 +58,8 @@ class Returning:
                     # Parts of a network that hear each other again: who is ahead waits for the others.
                     if self._pace.kind == "lockstep" and message.frame < index:
                         node.on_behind(name)
-                elif isinstance(message, Loss):
-                    node.on_loss(message)
+                elif isinstance(message, LostMessage):
+                    node.on_lost_message(message)
         if self._pace.kind == "lockstep":
             self._wait_for_company()
         heard = [node.heard[name] for name in self._there()]

@@ -9,7 +9,7 @@ import pytest
 from network.averaging.weights import MetropolisWeights
 from network.links.conditions import NS, Channel, ConditionsOptions
 from network.links.disturbed import DisturbedTransport
-from network.links.transport import Links, Loss
+from network.links.transport import Links, LostMessage
 from network.links.zenoh import ZenohTransport
 from network.rounds.consensus import Consensus
 from network.wire.messages import ConsensusMessage
@@ -59,13 +59,13 @@ def test_in_lockstep_what_is_lost_is_told_and_what_comes_twice_is_heard_twice(jo
     expected = []
     for frame in range(N):
         copies = len(beside.carry(3600 * NS * frame, SIZE_BYTES, frame))
-        expected += [frame] * copies or [Loss("A", frame, 1)]
+        expected += [frame] * copies or [LostMessage("A", frame, 1)]
 
     heard = [b.receive("A", 5.0) for _ in expected]
 
-    assert [each if isinstance(each, Loss) else each.frame for each in heard] == expected
-    assert any(isinstance(each, Loss) for each in heard)
-    assert b.counters.received["A"] == sum(not isinstance(each, Loss) for each in heard)
+    assert [each if isinstance(each, LostMessage) else each.frame for each in heard] == expected
+    assert any(isinstance(each, LostMessage) for each in heard)
+    assert b.counters.received["A"] == sum(not isinstance(each, LostMessage) for each in heard)
 
 
 def test_in_real_time_messages_come_when_they_are_due_in_their_order_and_the_lost_never(joined):

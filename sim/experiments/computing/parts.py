@@ -71,18 +71,16 @@ def central_part(scenario: Scenario, jpeg_quality: int | None = None) -> Part:
 def code_version() -> str:
     """A hash of everything that numbers come from: this program's source, and what it calculates with."""
     return _hash_of(
-        [
-            path
-            for path, name in _files(".py", ".c")
-            if not name.startswith(_NO_NUMBERS) or name.startswith("sim/experiments/computing")
-        ]
+        (path, name)
+        for path, name in _files(".py", ".c")
+        if not name.startswith(_NO_NUMBERS) or name.startswith("sim/experiments/computing")
     )
 
 
 @cache
 def program_version() -> str:
     """A hash of the whole program, with what it draws by."""
-    return _hash_of([path for path, _ in _files(".py", ".c", ".html", ".css")])
+    return _hash_of(_files(".py", ".c", ".html", ".css"))
 
 
 def _files(*endings: str) -> list[tuple[Path, str]]:
@@ -92,11 +90,10 @@ def _files(*endings: str) -> list[tuple[Path, str]]:
     return sorted((path, path.relative_to(root).as_posix()) for path in paths if path.suffix in endings)
 
 
-def _hash_of(paths: Iterable[Path]) -> str:
-    root = Path(sim.__file__).parents[1]
+def _hash_of(files: Iterable[tuple[Path, str]]) -> str:
     digest = hashlib.sha256()
-    for path in paths:
-        digest.update(f"{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes())
+    for path, name in files:
+        digest.update(f"{name}\0".encode() + path.read_bytes())
     digest.update(f"numpy {np.__version__}, opencv {cv2.__version__}".encode())
     return digest.hexdigest()
 
