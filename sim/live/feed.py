@@ -64,7 +64,7 @@ class Feed:
             if self._wanted and looking is None:
                 looking = session.declare_subscriber(keys.preview(self._run), hear)
             elif not self._wanted and looking is not None:
-                looking.undeclare()  # type: ignore[no-untyped-call]
+                looking.undeclare()  # type: ignore[no-untyped-call]  # zenoh's stub has none here
                 looking = None
             with self._changed:
                 while not self._closed.is_set() and self._wanted == (looking is not None):

@@ -125,7 +125,7 @@ class McapFilm:
         """Writes the index and closes the file."""
         if not self._file.closed:
             try:
-                self._writer.finish()  # type: ignore[no-untyped-call]
+                self._writer.finish()  # type: ignore[no-untyped-call]  # mcap has no types
                 self._file.close()
             finally:
                 self._abandon()

@@ -49,7 +49,7 @@ def compute_on_cluster(parts: Sequence[Part], address: str) -> Generator[Result,
     except ImportError:
         raise EngineError('--cluster needs Dask: pip install "dcpf[cluster]"') from None
     try:
-        client = Client(address, timeout=_CONNECT_S)  # type: ignore[no-untyped-call]
+        client = Client(address, timeout=_CONNECT_S)  # type: ignore[no-untyped-call]  # distributed has no types
     except (OSError, ValueError) as error:
         raise EngineError(
             f"--cluster {address}: no Dask scheduler answers there: start one, or name another address"
@@ -57,9 +57,9 @@ def compute_on_cluster(parts: Sequence[Part], address: str) -> Generator[Result,
     with client:
         futures = client.map(_with_part, parts, code=code_version(), pure=False)
         try:
-            yield from (result for _, result in as_completed(futures, with_results=True))  # type: ignore[no-untyped-call]
+            yield from (result for _, result in as_completed(futures, with_results=True))  # type: ignore[no-untyped-call]  # distributed has no types
         finally:
-            client.cancel(futures)  # type: ignore[no-untyped-call]
+            client.cancel(futures)  # type: ignore[no-untyped-call]  # distributed has no types
 
 
 def _with_part(part: Part, code: str) -> Result:
