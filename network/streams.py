@@ -16,5 +16,7 @@ def stream(seed: int, *names: str) -> np.random.Generator:
         names: What draws the numbers, from the outside in, such as ``"C1", "fusion"``.
     """
     digest = hashlib.sha256("/".join(names).encode()).digest()
-    words = np.frombuffer(digest[:16], dtype="<u4").tolist()
-    return np.random.default_rng([seed, *words])
+    # the seed and the digest as words of 32 bits, which is what NumPy makes of any numbers
+    n_words = max(-(-seed.bit_length() // 32), 1)
+    words = np.frombuffer(seed.to_bytes(4 * n_words, "little") + digest[:16], dtype="<u4")
+    return np.random.default_rng(words)
