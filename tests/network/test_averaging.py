@@ -148,6 +148,20 @@ def test_the_rounds_equal_their_matrices(rounds, net, name):
     np.testing.assert_allclose(history, expected, atol=1e-10)
 
 
+@pytest.mark.parametrize("name", [*THEORY, "finite_time"])
+@pytest.mark.parametrize("dense", [0, np.inf])
+def test_all_rounds_at_once_are_the_rounds_one_by_one(monkeypatch, net, name, dense):
+    monkeypatch.setattr(matrices, "_DENSE", dense)
+    # information and its vector: numbers of all sizes
+    scale = [1e-3, 1.0, 1e6]
+    values = scale * np.random.default_rng(3).normal(size=(len(net.names), 3))
+    made = THEORY[name][0](net) if name in THEORY else FiniteTime()
+    for iterations in (0, 1, 12, 33):
+        expected = next(itertools.islice(matrix_rounds(name, net, values), iterations, None))
+        found = matrices.averaging(made, net, iterations)(values)
+        np.testing.assert_allclose(found / scale, expected / scale, atol=1e-13)
+
+
 @pytest.mark.parametrize("name", THEORY)
 def test_the_average_stays(rounds, net, name):
     values = np.random.default_rng(3).normal(size=(len(net.names), 3))
