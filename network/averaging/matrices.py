@@ -140,11 +140,13 @@ def ratio_rate(L: sparse.csr_array) -> float:
     return float(np.abs(1 - eigenvalues).max(initial=0.0))
 
 
-def residual(values: Float[np.ndarray, "C K"], start: Float[np.ndarray, "C K"]) -> float:
-    """||X(t) - mean|| / ||X(0) - mean||; 0 where the start has no error."""
-    mean = start.mean(axis=0)
-    error = float(np.linalg.norm(start - mean))
-    return float(np.linalg.norm(values - mean)) / error if error else 0.0
+def residual(
+    values: Float[np.ndarray, "*T C K"], start: Float[np.ndarray, "*T C K"]
+) -> Float[np.ndarray, "*T"]:
+    """||X(t) - mean|| / ||X(0) - mean||, or that of each of many; 0 where the start has no error."""
+    mean = np.einsum("...ck->...k", start)[..., None, :] / start.shape[-2]
+    error, left = (np.sqrt(np.einsum("...ck,...ck->...", e, e)) for e in (start - mean, values - mean))
+    return np.divide(left, error, out=np.zeros_like(error), where=error > 0)
 
 
 def worst_residual(values: Float[np.ndarray, "C C"]) -> float:

@@ -50,11 +50,12 @@ def simulate(
     assembly, found, times = Assembly(chosen), Simulated(chosen), []
     with progress_bar(f"{chosen.name}: frames", chosen.frames) as bar:
         began = time.perf_counter()
-        for done, frame in enumerate(simulated_frames(assembly), start=1):
-            found.add(frame)
-            times.append(time.perf_counter() - began)
+        for block in simulated_frames(assembly):
+            found.add(block)
+            n_frames = len(block.truth)
+            times += n_frames * [(time.perf_counter() - began) / n_frames]
             began = time.perf_counter()
-            bar(done)
+            bar(len(times))
     summary = found.summary(float(np.median(times[1:])), time.monotonic() - BEGAN_S)
     folder = out or Path("runs") / f"simulate-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
     try:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from pydantic import Field
 
 from network.options import Options
@@ -56,48 +56,49 @@ class Sensors:
             np.array([(camera.width_px, camera.height_px) for camera in cameras], dtype=float),
         )
 
+    def chosen(self, rows: Int[np.ndarray, " S"]) -> "Sensors":
+        """Some of them, in this order."""
+        return Sensors(self.K[rows], self.R[rows], self.t[rows], self.size_px[rows])
+
     def project(
-        self, point: Float[np.ndarray, " 3"]
-    ) -> tuple[Float[np.ndarray, "C 2"], Float[np.ndarray, "C 3"]]:
-        """A point of the world in all pictures: pixels, and places in camera axes in m."""
-        places = self.R @ point + self.t
+        self, point: Float[np.ndarray, "*T 3"]
+    ) -> tuple[Float[np.ndarray, "*T C 2"], Float[np.ndarray, "*T C 3"]]:
+        """A point of the world in all pictures, frame by frame: pixels, and places in camera axes in m."""
+        places = np.matvec(self.R, point[..., None, :]) + self.t
         # (u, v, 1) z = K x
         homogeneous = np.matvec(self.K, places)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return homogeneous[:, :2] / homogeneous[:, 2:], places
+            return homogeneous[..., :2] / homogeneous[..., 2:], places
 
     def derivatives(self, places: Float[np.ndarray, "C 3"]) -> Float[np.ndarray, "C 2 3"]:
         """Of the pixels by the position in the world, at places in camera axes, px/m."""
         x, y, z = places.T[:, :, None]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            # d(x/z) = (r₁ - (x/z) r₃) / z
-            slopes = np.stack(
-                [self.R[:, 0] - x / z * self.R[:, 2], self.R[:, 1] - y / z * self.R[:, 2]], axis=1
-            )
-            return self.K[:, :2, :2] @ slopes / z[:, :, None]
+        # d(x/z) = (r₁ - (x/z) r₃) / z
+        slopes = np.stack([self.R[:, 0] - x / z * self.R[:, 2], self.R[:, 1] - y / z * self.R[:, 2]], axis=1)
+        return self.K[:, :2, :2] @ slopes / z[:, :, None]
 
     def in_view(
-        self, pixels: Float[np.ndarray, "C 2"], places: Float[np.ndarray, "C 3"], range_m: float
-    ) -> Bool[np.ndarray, " C"]:
+        self, pixels: Float[np.ndarray, "*T C 2"], places: Float[np.ndarray, "*T C 3"], range_m: float
+    ) -> Bool[np.ndarray, "*T C"]:
         """Which cameras have a point in their picture, in front of them and near enough."""
         with np.errstate(invalid="ignore"):
-            inside = ((pixels >= -0.5) & (pixels < self.size_px - 0.5)).all(axis=1)
-        return inside & (places[:, 2] > 0) & (np.linalg.norm(places, axis=1) <= range_m)
+            inside = ((pixels >= -0.5) & (pixels < self.size_px - 0.5)).all(axis=-1)
+        return inside & (places[..., 2] > 0) & (np.linalg.norm(places, axis=-1) <= range_m)
 
 
 def measure(
     sensors: Sensors,
-    middle: Float[np.ndarray, " 3"],
+    middle: Float[np.ndarray, "*T 3"],
     n_axes: int,
     options: SensorOptions,
-    luck: Float[np.ndarray, " C"],
-    noise: Float[np.ndarray, "C 2"],
-) -> tuple[Information, Bool[np.ndarray, " C"]]:
+    luck: Float[np.ndarray, "*T C"],
+    noise: Float[np.ndarray, "*T C 2"],
+) -> tuple[Information, Bool[np.ndarray, "*T C"]]:
     """What all cameras say about the target's position; exactly nothing where they do not see it.
 
     Args:
         sensors: The cameras.
-        middle: The target's true middle, in m.
+        middle: The target's true middle, in m; of one frame or of many.
         n_axes: Axes of the position: 2 on a plane, 3 in a volume.
         options: The sensor.
         luck: Uniform draws from [0, 1), which decide about occlusion.
@@ -108,9 +109,13 @@ def measure(
     """
     pixels, places = sensors.project(middle)
     seen = sensors.in_view(pixels, places, options.range_m) & (luck >= options.occlusion)
-    # A / σ, of what is seen
-    A = np.where(seen[:, None, None], sensors.derivatives(places)[:, :, :n_axes] / options.noise_px, 0.0)
+    # the rest is for those few
+    cameras = np.nonzero(seen)[-1]
+    x = np.broadcast_to(middle[..., None, :n_axes], (*seen.shape, n_axes))[seen]
+    # A / σ
+    A = sensors.chosen(cameras).derivatives(places[seen])[:, :, :n_axes] / options.noise_px
     # Λ = AᵀA / σ², η = Λ x + Aᵀ e / σ
-    matrix = A.swapaxes(1, 2) @ A
-    vector = matrix @ middle[:n_axes] + np.matvec(A.swapaxes(1, 2), noise)
+    matrix, vector = np.zeros((*seen.shape, n_axes, n_axes)), np.zeros((*seen.shape, n_axes))
+    matrix[seen] = A.swapaxes(1, 2) @ A
+    vector[seen] = np.matvec(matrix[seen], x) + np.matvec(A.swapaxes(1, 2), noise[seen])
     return Information(matrix, vector), seen

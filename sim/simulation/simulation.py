@@ -3,11 +3,13 @@
 Every node keeps its own estimate; nothing stands for the others. Rounds are products with a sparse matrix
 (`network.averaging.matrices`), so that a frame costs O(C) for C cameras with some neighbours each. Beside
 them runs the Kalman filter that has all measurements: the exact answer, as CPF is in a run with pictures.
+
+What does not depend on the frame before, measurements and errors, is worked out for a block of frames at
+once: in a small network, a call of NumPy takes longer than what it is called for.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -16,35 +18,37 @@ from threadpoolctl import threadpool_limits
 from network.averaging import matrices
 from network.streams import stream
 from nodes.filtering.fusion import RULES
-from nodes.filtering.gaussian import Information, Moments, to_information, to_moments
-from nodes.filtering.rules.rule import plus_on_position
+from nodes.filtering.gaussian import Information, Moments
 from sim.assembly import Assembly
 from sim.scenario.model import Scenario
 from sim.scenario.parsing import ScenarioError
-from sim.simulation.gaussians import GaussianEstimate, fused, predict, summed
+from sim.simulation.gaussians import GaussianEstimate, fused, predict, with_all
 from sim.simulation.sensor import Sensors, measure
+
+_BLOCK = 10_000
+"""Cameras times frames in a block."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SimulatedFrame:
-    """What a frame has brought.
+class SimulatedFrames:
+    """What a block of frames has brought.
 
     Attributes:
-        truth: The target's state.
-        nodes: Every node's estimate.
+        truth: The target's states.
+        nodes: Every node's estimates.
         exact: The Kalman filter's with all measurements.
         seen: Which cameras saw the target.
         residual: What the rounds left of the nodes' disagreement about what was sent.
     """
 
-    truth: Float[np.ndarray, " D"]
+    truth: Float[np.ndarray, "T D"]
     nodes: Moments
     exact: Moments
-    seen: Bool[np.ndarray, " C"]
-    residual: float
+    seen: Bool[np.ndarray, "T C"]
+    residual: Float[np.ndarray, " T"]
 
 
-def simulate(assembly: Assembly) -> Iterator[SimulatedFrame]:
+def simulate(assembly: Assembly) -> Iterator[SimulatedFrames]:
     """Simulates a scenario's network, from frame 0, the start, on.
 
     Raises:
@@ -65,45 +69,71 @@ def simulate(assembly: Assembly) -> Iterator[SimulatedFrame]:
     sensors = Sensors.of(list(assembly.cameras.values()))
     n_cameras, (n_frames, n_states) = len(sensors.K), truth.shape
     rule, motion, ridge = RULES[scenario.fusion.rule], assembly.setup.motion, scenario.fusion.ridge
+    F, Q = motion.F, np.diag(motion.variances)
     network = scenario.network
     try:
-        rounds = matrices.rounds(network.consensus, assembly.graph)
+        average = matrices.averaging(network.consensus, assembly.graph, network.iterations)
     except ValueError as error:
         raise ScenarioError(f"{scenario.name}: network.consensus: {error}") from error
-    exact = assembly.start.moments
-    nodes = Moments(np.tile(exact.mean, (n_cameras, 1)), np.tile(exact.covariance, (n_cameras, 1, 1)))
-    yield SimulatedFrame(truth[0], nodes, exact, np.zeros(n_cameras, dtype=bool), 0.0)
-    for frame in range(1, n_frames):
+    # of all nodes, and of the central one
+    start, rows = assembly.start.moments, n_cameras + 1
+    moments = Moments(np.tile(start.mean, (rows, 1)), np.tile(start.covariance, (rows, 1, 1)))
+    yield _block(truth[:1], [moments], np.zeros((1, n_cameras), dtype=bool), np.zeros(1))
+    n_block = frames_per_block(n_cameras)
+    for first in range(1, n_frames, n_block):
+        states = truth[first : first + n_block]
         # sense
-        told, seen = _sense(scenario, sensors, truth[frame], frame)
-        # predict
-        local = GaussianEstimate(predict(nodes, motion), told, ridge)
-        # average (Eq. 3)
-        packed = rule.pack(local, n_cameras)
-        (average,) = islice(rounds(packed), network.iterations, network.iterations + 1)
-        # fuse
-        nodes = fused(local, rule.unpack(average, n_cameras, n_states))
-        exact = _updated(predict(exact, motion), summed(told), ridge)
-        yield SimulatedFrame(truth[frame], nodes, exact, seen, matrices.residual(average, packed))
+        told, seen = _sense(scenario, sensors, states, first)
+        estimates, sent, averages = [], [], []
+        for matrix, vector in zip(told.matrix, told.vector, strict=True):
+            # predict
+            local = GaussianEstimate(predict(moments, F, Q), Information(matrix, vector), ridge)
+            # average (Eq. 3); the central node's is exact: N times it is the sum
+            packed = rule.pack(local, n_cameras)
+            averaged = np.concatenate([average(packed[:-1]), packed[-1:] / n_cameras])
+            # fuse
+            moments = fused(local, rule.unpack(averaged, n_cameras, n_states))
+            estimates.append(moments)
+            sent.append(packed[:-1])
+            averages.append(averaged[:-1])
+        yield _block(states, estimates, seen, matrices.residual(np.array(averages), np.array(sent)))
+
+
+def frames_per_block(n_cameras: int) -> int:
+    """How many frames of so many cameras are in a block."""
+    return max(_BLOCK // n_cameras, 1)
+
+
+def _block(
+    truth: Float[np.ndarray, "T D"],
+    estimates: Sequence[Moments],
+    seen: Bool[np.ndarray, "T C"],
+    residual: Float[np.ndarray, " T"],
+) -> SimulatedFrames:
+    """Frames one after the other, the central node's estimates apart."""
+    mean = np.array([each.mean for each in estimates])
+    covariance = np.array([each.covariance for each in estimates])
+    nodes = Moments(mean[:, :-1], covariance[:, :-1])
+    # copies, which do not keep all the others
+    exact = Moments(mean[:, -1].copy(), covariance[:, -1].copy())
+    return SimulatedFrames(truth, nodes, exact, seen, residual)
 
 
 def _sense(
-    scenario: Scenario, sensors: Sensors, state: Float[np.ndarray, " D"], frame: int
-) -> tuple[Information, Bool[np.ndarray, " C"]]:
-    """All measurements of a frame; another camera more changes nobody else's."""
-    target, n_cameras = scenario.target, len(sensors.K)
-    position = state[: target.n_axes]
-    middle = (
-        position if target.n_axes == 3 else np.array([*position, target.plane_height + target.height / 2])
-    )
-    luck = stream(scenario.seed, "sensor", "occlusion", str(frame)).random(n_cameras)
-    noise = stream(scenario.seed, "sensor", "noise", str(frame)).standard_normal((n_cameras, 2))
-    return measure(sensors, middle, target.n_axes, scenario.sensor, luck, noise)
-
-
-def _updated(predicted: Moments, told: Information, ridge: float) -> Moments:
-    """The Kalman filter's update in information form: p⁻¹ = r⁻¹ + Λ."""
-    return to_moments(plus_on_position(to_information(predicted, ridge), told))
+    scenario: Scenario, sensors: Sensors, truth: Float[np.ndarray, "T D"], first: int
+) -> tuple[Information, Bool[np.ndarray, "T C"]]:
+    """All measurements of the frames from the first on; another camera more changes nobody else's."""
+    target, n_frames, n_cameras = scenario.target, len(truth), len(sensors.K)
+    middle = truth[:, : target.n_axes]
+    if target.n_axes == 2:
+        middle = np.hstack([middle, np.full((n_frames, 1), target.plane_height + target.height / 2)])
+    luck, noise = np.empty((n_frames, n_cameras)), np.empty((n_frames, n_cameras, 2))
+    for row in range(n_frames):
+        frame = str(first + row)
+        stream(scenario.seed, "sensor", "occlusion", frame).random(out=luck[row])
+        stream(scenario.seed, "sensor", "noise", frame).standard_normal(out=noise[row])
+    told, seen = measure(sensors, middle, target.n_axes, scenario.sensor, luck, noise)
+    return with_all(told), seen
 
 
 def _require_closed_form(scenario: Scenario) -> None:

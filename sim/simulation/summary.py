@@ -14,7 +14,7 @@ from nodes.filtering.gaussian import Moments
 from sim.metrics.errors import rmse
 from sim.scenario.model import Scenario
 from sim.simulation.gaussians import normalized_errors
-from sim.simulation.simulation import SimulatedFrame
+from sim.simulation.simulation import SimulatedFrames
 
 
 @dataclass(slots=True)
@@ -47,27 +47,31 @@ class Simulated:
     residual: list[float] = field(default_factory=list)
     last: Moments | None = None
 
-    def add(self, frame: SimulatedFrame) -> None:
-        """Takes a frame."""
-        n_axes = len(frame.truth) // 2
-        positions = frame.nodes.mean[:, :n_axes]
-        exact = Moments(frame.exact.mean[None], frame.exact.covariance[None])
-        self.truth.append(frame.truth)
-        self.exact.append(frame.exact.mean)
-        self.errors.append(np.linalg.norm(positions - frame.truth[:n_axes], axis=1))
-        self.exact_errors.append(float(np.linalg.norm(frame.exact.mean[:n_axes] - frame.truth[:n_axes])))
-        self.nees.append(normalized_errors(frame.nodes, frame.truth))
-        self.exact_nees.append(float(normalized_errors(exact, frame.truth)[0]))
-        self.seen.append(frame.seen)
-        self.disagreement.append(self._disagreement(positions))
-        self.residual.append(frame.residual)
-        self.last = frame.nodes
+    def add(self, frames: SimulatedFrames) -> None:
+        """Takes a block of frames."""
+        n_axes = frames.truth.shape[1] // 2
+        truth, positions = frames.truth[:, :n_axes], frames.nodes.mean[:, :, :n_axes]
+        exact = Moments(frames.exact.mean[:, None], frames.exact.covariance[:, None])
+        self.disagreement.extend(self._disagreement(positions))
+        self.truth.extend(frames.truth)
+        self.exact.extend(frames.exact.mean)
+        self.errors.extend(np.linalg.norm(positions - truth[:, None], axis=2))
+        self.exact_errors.extend(np.linalg.norm(frames.exact.mean[:, :n_axes] - truth, axis=1).tolist())
+        self.nees.extend(normalized_errors(frames.nodes, frames.truth))
+        self.exact_nees.extend(normalized_errors(exact, frames.truth)[:, 0].tolist())
+        self.seen.extend(frames.seen)
+        self.residual.extend(frames.residual.tolist())
+        self.last = Moments(frames.nodes.mean[-1], frames.nodes.covariance[-1])
 
-    def _disagreement(self, positions: Float[np.ndarray, "C A"]) -> float:
+    def _disagreement(self, positions: Float[np.ndarray, "T C A"]) -> list[float]:
         """Mean distance of nodes next to each other in a random order: of all pairs, there are too many."""
-        order = stream(self.scenario.seed, "disagreement", str(len(self.truth))).permutation(len(positions))
-        apart = np.linalg.norm(positions[order] - positions[np.roll(order, 1)], axis=1)
-        return float(apart.mean())
+        n_frames, n_cameras, _ = positions.shape
+        orders = np.empty((n_frames, n_cameras), dtype=int)
+        for row, order in enumerate(orders, start=len(self.truth) + 1):
+            order[:] = stream(self.scenario.seed, "disagreement", str(row)).permutation(n_cameras)
+        shuffled = np.take_along_axis(positions, orders[:, :, None], axis=1)
+        apart = np.linalg.norm(shuffled - np.roll(shuffled, 1, axis=1), axis=2)
+        return apart.mean(axis=1).tolist()
 
     def summary(self, frame_s: float, total_s: float) -> dict[str, Any]:
         """The numbers, frame 0 left out.

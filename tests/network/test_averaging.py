@@ -187,3 +187,9 @@ def test_residuals():
     assert matrices.residual(start, start) == 1
     assert matrices.residual(np.array([[2.0], [3.0]]), start) == pytest.approx(np.sqrt(0.5))
     assert matrices.residual(start, np.ones((2, 1))) == 0
+    many = np.random.default_rng(3).normal(size=(2, 5, 4, 3))
+    expected = [
+        np.linalg.norm(x - x0.mean(axis=0)) / np.linalg.norm(x0 - x0.mean(axis=0))
+        for x, x0 in zip(*many, strict=True)
+    ]
+    np.testing.assert_allclose(matrices.residual(*many), expected)

@@ -87,6 +87,19 @@ def test_measurements_of_many_draws_have_the_mean_and_the_covariance_that_they_c
     assert np.abs(spread).max() < 4 * np.sqrt(2 / n)
 
 
+def test_many_frames_are_measured_as_each_by_itself():
+    rng = np.random.default_rng(3)
+    sensors, options = Sensors.of(cameras(rng, 20)), SensorOptions()
+    middle, luck, noise = rng.uniform(-2, 2, (7, 3)), rng.random((7, 20)), rng.standard_normal((7, 20, 2))
+    together, seen = measure(sensors, middle, 2, options, luck, noise)
+    assert seen.any()
+    for frame in range(7):
+        alone, seen_alone = measure(sensors, middle[frame], 2, options, luck[frame], noise[frame])
+        assert np.array_equal(seen[frame], seen_alone)
+        np.testing.assert_allclose(together.matrix[frame], alone.matrix, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(together.vector[frame], alone.vector, rtol=1e-9, atol=1e-9)
+
+
 def test_occlusion_is_as_likely_as_it_says():
     rng = np.random.default_rng(2)
     camera = look_at("C", np.array([-4.0, 1.0, 3.0]), np.zeros(3), 150.0, (160, 120), np.zeros(5))

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from typer.testing import CliRunner
 
 from network.streams import stream
 from nodes.filtering.fusion import RULES
+from nodes.filtering.gaussian import Moments
 from nodes.filtering.motion import constant_velocity
 from sim.assembly import Assembly
 from sim.commands.app import app
@@ -24,7 +26,21 @@ EXACT = (("network.graph", "ring"), ("network.consensus.algorithm", "finite_time
 
 def frames(*overrides, cameras=9, n_frames=12):
     given = [("cameras.count", str(cameras)), ("frames", str(n_frames)), *overrides]
-    return list(simulate(Assembly(load_scenario(HALL, given, rendered=False))))
+    return frames_of(load_scenario(HALL, given, rendered=False))
+
+
+def frames_of(scenario):
+    return [
+        SimpleNamespace(
+            truth=block.truth[index],
+            nodes=Moments(block.nodes.mean[index], block.nodes.covariance[index]),
+            exact=Moments(block.exact.mean[index], block.exact.covariance[index]),
+            seen=block.seen[index],
+            residual=block.residual[index],
+        )
+        for block in simulate(Assembly(scenario))
+        for index in range(len(block.truth))
+    ]
 
 
 def kalman(scenario):
@@ -53,7 +69,7 @@ def kalman(scenario):
 
 def test_the_exact_estimate_is_the_kalman_filters():
     scenario = load_scenario(HALL, [("cameras.count", "9"), ("frames", "12")], rendered=False)
-    for frame, (mean, covariance) in zip(simulate(Assembly(scenario)), kalman(scenario), strict=True):
+    for frame, (mean, covariance) in zip(frames_of(scenario), kalman(scenario), strict=True):
         np.testing.assert_allclose(frame.exact.mean, mean, atol=1e-7)
         np.testing.assert_allclose(frame.exact.covariance, covariance, atol=1e-7)
 
@@ -97,6 +113,24 @@ def test_a_camera_more_changes_no_other_cameras_luck():
         assert (one.seen == other.seen[:90]).mean() > 0.95
 
 
+@pytest.mark.parametrize("rule", RULES)
+def test_the_exact_estimate_is_the_same_whatever_the_rule(rule):
+    for frame, kalmans in zip(frames(("fusion.rule", rule)), frames(), strict=True):
+        np.testing.assert_allclose(frame.exact.mean, kalmans.exact.mean, atol=1e-9)
+        np.testing.assert_allclose(frame.exact.covariance, kalmans.exact.covariance, atol=1e-9)
+
+
+@pytest.mark.parametrize("n_block", [1, 4, 11])
+def test_how_many_frames_are_in_a_block_changes_nothing(monkeypatch, n_block):
+    expected = frames()
+    monkeypatch.setattr("sim.simulation.simulation.frames_per_block", lambda _: n_block)
+    for frame, other in zip(frames(), expected, strict=True):
+        assert np.array_equal(frame.seen, other.seen)
+        np.testing.assert_allclose(frame.nodes.mean, other.nodes.mean, atol=1e-12)
+        np.testing.assert_allclose(frame.nodes.covariance, other.nodes.covariance, atol=1e-12)
+        assert frame.residual == pytest.approx(other.residual)
+
+
 def test_covariance_intersection_claims_least():
     one, other = (frames(("fusion.rule", rule))[-1].nodes for rule in ("covariance_intersection", "icf"))
     assert (np.trace(one.covariance, axis1=1, axis2=2) > np.trace(other.covariance, axis1=1, axis2=2)).all()
@@ -110,9 +144,9 @@ def test_a_volume_is_simulated_as_well():
 
 def test_the_summary_is_what_the_frames_say():
     scenario = load_scenario(HALL, [("cameras.count", "9"), ("frames", "12")], rendered=False)
-    found, told = Simulated(scenario), list(simulate(Assembly(scenario)))
-    for frame in told:
-        found.add(frame)
+    found, told = Simulated(scenario), frames_of(scenario)
+    for block in simulate(Assembly(scenario)):
+        found.add(block)
     summary = found.summary(0.001, 1.0)
     off = np.array([frame.nodes.mean[:, :2] - frame.truth[:2] for frame in told[1:]])
     assert summary["rmse_m"]["dcpf"] == pytest.approx(np.sqrt((off**2).sum(axis=2).mean()))
