@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from network.links.transport import LostMessage
 from network.rounds.consensus import Consensus
-from network.wire.messages import ConsensusMessage
+from network.wire.messages import ConsensusMessage, PeerMessage
 
 SILENT_ROUNDS = 12
 """Rounds in a row without a word of a neighbour after which it is gone: by 30% loss, one in a million."""
@@ -41,6 +41,12 @@ class Rounds:
         """Opens a frame's rounds with the camera's own value."""
         self._frame = frame
         return self.of(frame).begin(frame, value)
+
+    def take(self, message: PeerMessage | LostMessage) -> Outgoing:
+        """Takes what a link brings: a neighbour's message, or that it is lost; all else is passed over."""
+        if isinstance(message, ConsensusMessage):
+            return self.receive(message)
+        return self.miss(message) if isinstance(message, LostMessage) else ()
 
     def receive(self, message: ConsensusMessage) -> Outgoing:
         """Takes a neighbour's message; who was gone and speaks of these frames is counted on again."""

@@ -147,12 +147,12 @@ def test_at_the_deadline_the_rounds_done_must_do(room):
     bench.start(1, ("C1", "C2"))  # the others are late
     bench.deliver()
     node = bench.nodes["C1"]
-    assert node.waiting_for(1) == ("C4",)
+    assert node.awaited() == ("C4",)
     bench.hear("C1", node.on_deadline(1))
     cut = bench.estimates[1, "C1", "dcpf"]
-    assert cut.iterations == node.rounds_done - N_ROUNDS < N_ROUNDS
+    assert cut.iterations == node.rounds.done - N_ROUNDS < N_ROUNDS
     assert bench.error(1, "C1") < 0.3
-    assert node.waiting_for(1) == ()
+    assert node.awaited() == ()
     assert node.on_deadline(1) == ()  # the frame is over already
 
 
