@@ -5,7 +5,7 @@ each of them, and what is known of a neighbour holds for all.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -41,6 +41,15 @@ class Rounds:
         """Opens a frame's rounds with the camera's own value."""
         self._frame = frame
         return self.of(frame).begin(frame, value)
+
+    def under_way(self, frames: Iterable[int]) -> dict[int, int]:
+        """Those of some frames whose rounds are not over, and the round, from 1, that each is in."""
+        return {frame: lane.rounds_done + 1 for frame in frames if not (lane := self.of(frame)).done}
+
+    def awaited(self, frames: Iterable[int]) -> tuple[str, ...]:
+        """Neighbours that some frames wait for; none where the first frame's rounds are over."""
+        lanes = [self.of(frame) for frame in frames]
+        return () if not lanes or lanes[0].done else sum((lane.waiting_for() for lane in lanes), ())
 
     def take(self, message: PeerMessage | LostMessage) -> Outgoing:
         """Takes what a link brings: a neighbour's message, or that it is lost; all else is passed over."""

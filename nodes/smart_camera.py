@@ -156,16 +156,11 @@ class SmartCamera:
     @property
     def open_rounds(self) -> Mapping[int, int]:
         """Frames whose rounds are not over, from the oldest on, and the round, from 1, that each is in."""
-        return {
-            frame: lane.rounds_done + 1 for frame in self._frames if not (lane := self.rounds.of(frame)).done
-        }
+        return self.rounds.under_way(self._frames)
 
     def awaited(self) -> tuple[str, ...]:
         """Neighbours whose messages the rounds wait for; none where a frame's second half is due."""
-        lanes = [self.rounds.of(frame) for frame in self._frames]
-        if not lanes or lanes[0].done:
-            return ()
-        return lanes[0].waiting_for() if len(lanes) == 1 else sum((lane.waiting_for() for lane in lanes), ())
+        return self.rounds.awaited(self._frames)
 
     @property
     def state(self) -> StateMessage:
