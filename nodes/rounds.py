@@ -5,14 +5,14 @@ each of them, and what is known of a neighbour holds for all.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from network.links.transport import LostMessage
 from network.rounds.consensus import Consensus
-from network.wire.messages import ConsensusMessage
+from network.wire.messages import ConsensusMessage, PeerMessage
 
 SILENT_ROUNDS = 12
 """Rounds in a row without a word of a neighbour after which it is gone: by 30% loss, one in a million."""
@@ -41,6 +41,21 @@ class Rounds:
         """Opens a frame's rounds with the camera's own value."""
         self._frame = frame
         return self.of(frame).begin(frame, value)
+
+    def under_way(self, frames: Iterable[int]) -> dict[int, int]:
+        """Those of some frames whose rounds are not over, and the round, from 1, that each is in."""
+        return {frame: lane.rounds_done + 1 for frame in frames if not (lane := self.of(frame)).done}
+
+    def awaited(self, frames: Iterable[int]) -> tuple[str, ...]:
+        """Neighbours that some frames wait for; none where the first frame's rounds are over."""
+        lanes = [self.of(frame) for frame in frames]
+        return () if not lanes or lanes[0].done else sum((lane.waiting_for() for lane in lanes), ())
+
+    def take(self, message: PeerMessage | LostMessage) -> Outgoing:
+        """Takes what a link brings: a neighbour's message, or that it is lost; all else is passed over."""
+        if isinstance(message, ConsensusMessage):
+            return self.receive(message)
+        return self.miss(message) if isinstance(message, LostMessage) else ()
 
     def receive(self, message: ConsensusMessage) -> Outgoing:
         """Takes a neighbour's message; who was gone and speaks of these frames is counted on again."""

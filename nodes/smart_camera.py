@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from network.links.transport import LostMessage
 from network.rounds.consensus import Consensus
 from network.wire.messages import ConsensusMessage, EstimateMessage, PreviewMessage, StateMessage
 from nodes.estimators.array_estimator import ArrayEstimator
@@ -38,6 +37,7 @@ class SmartCamera:
 
     Attributes:
         name: The camera's name, which is the node's.
+        rounds: Its averaging with its neighbours.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class SmartCamera:
         """
         self.name = model.camera.name
         self._indefinite: Counter[str] = Counter(indefinite_local=0, indefinite_fused=0)
-        self._model, self._setup, self._rounds = model, setup, Rounds(lanes)
+        self._model, self._setup, self.rounds = model, setup, Rounds(lanes)
         self._motion = setup.motion
         self._fusion_rng = setup.stream(self.name, "fusion")
         self._local_rng = setup.stream(self.name, "local")
@@ -96,16 +96,21 @@ class SmartCamera:
         self._indefinite["indefinite_local"] += not is_density(local, self._setup.fusion)
         # exchange (Eq. 3)
         self._frames[index] = FrameInProgress(index, picture, self._done_frame, previous, predicted, usable)
-        packed = pack(local, len(self._rounds.of(index).members), self._setup.fusion)
-        return self._with_result(self._rounds.begin(index, packed))
+        packed = pack(local, len(self.rounds.of(index).members), self._setup.fusion)
+        return self.rounds.begin(index, packed) + self.on_rounds_over()
 
     def on_message(self, message: ConsensusMessage) -> Outgoing:
         """A neighbour's value of a round has come; one that was gone is counted on again."""
-        return self._with_result(self._rounds.receive(message))
+        return self.rounds.receive(message) + self.on_rounds_over()
 
-    def on_lost_message(self, lost: LostMessage) -> Outgoing:
-        """A neighbour's value of a round is lost: nobody waits for it."""
-        return self._with_result(self._rounds.miss(lost))
+    def on_rounds_over(self) -> tuple[EstimateMessage, ...]:
+        """The second half of the frames whose rounds are over, if there are any: their estimates."""
+        estimates: tuple[EstimateMessage, ...] = ()
+        while self._frames and self.rounds.of(index := min(self._frames)).done:
+            frame = self._frames.pop(index)
+            estimates += self._finish(frame) if index else self._finish_first(frame)
+            self._done_frame = index
+        return estimates
 
     def on_return(self, image: UInt8[np.ndarray, "H W 3"], state: StateMessage) -> None:
         """The camera was away: it goes on with what a neighbour knows.
@@ -120,7 +125,7 @@ class SmartCamera:
         known = Moments(state.mean, state.covariance)
         self._particles = setup.particles(known, self._fusion_rng)
         self._local_particles = setup.particles(known, self._local_rng)
-        self._rounds.cut()
+        self.rounds.cut()
         self._frames.clear()
         self._last_frame = self._done_frame = state.frame
         self._sighting = Sighting()
@@ -130,22 +135,18 @@ class SmartCamera:
             # its own filter, the baseline, has nobody to ask
             self._single = None
 
-    def on_behind(self, neighbor: str) -> None:
-        """A neighbour is some frames behind: from the next frame on, it is waited for."""
-        self._rounds.restore(neighbor)
-
     def on_lost(self, neighbor: str) -> Outgoing:
         """A neighbour is gone: the rounds go on without it."""
-        return self._with_result(self._rounds.lose(neighbor))
+        return self.rounds.lose(neighbor) + self.on_rounds_over()
 
     def on_round_deadline(self, frame: int) -> Outgoing:
         """The time of a frame's round is up: it is done without those that are late."""
-        return self._with_result(self._rounds.expire(frame))
+        return self.rounds.expire(frame) + self.on_rounds_over()
 
     def on_deadline(self, frame: int) -> Outgoing:
         """A frame's time is up: what the rounds have reached must do."""
-        self._rounds.of(frame).cut()
-        return self._with_result(())
+        self.rounds.of(frame).cut()
+        return self.on_rounds_over()
 
     def preview(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> PreviewMessage:
         """What a frame that is done looks like, for people."""
@@ -155,18 +156,11 @@ class SmartCamera:
     @property
     def open_rounds(self) -> Mapping[int, int]:
         """Frames whose rounds are not over, from the oldest on, and the round, from 1, that each is in."""
-        return {
-            frame: lane.rounds_done + 1 for frame in self._frames if not (lane := self._rounds.of(frame)).done
-        }
+        return self.rounds.under_way(self._frames)
 
-    def waiting_for(self, frame: int) -> tuple[str, ...]:
-        """Neighbours that a frame waits for; none when it is done."""
-        return self._rounds.of(frame).waiting_for() if frame in self._frames else ()
-
-    @property
-    def heard(self) -> Mapping[str, int]:
-        """The latest frame in which each neighbour has spoken, -1 for one that never has."""
-        return self._rounds.heard
+    def awaited(self) -> tuple[str, ...]:
+        """Neighbours whose messages the rounds wait for; none where a frame's second half is due."""
+        return self.rounds.awaited(self._frames)
 
     @property
     def state(self) -> StateMessage:
@@ -174,11 +168,6 @@ class SmartCamera:
         looks = pack_looks(self._appearance, self._setup.filter.color)
         mean, covariance = self._estimate.mean, self._estimate.covariance
         return StateMessage(self.name, self._done_frame, mean, covariance, looks)
-
-    @property
-    def rounds_done(self) -> int:
-        """Rounds of consensus done since the first frame."""
-        return self._rounds.done
 
     @property
     def counters(self) -> Counters:
@@ -191,7 +180,7 @@ class SmartCamera:
         report = self._array_report
         return {
             **self._indefinite,
-            "unused": self._rounds.counters,
+            "unused": self.rounds.counters,
             "knocked": self._standstill.knocked,
             **({"simd": report.figures} if report else {}),
         }
@@ -202,15 +191,6 @@ class SmartCamera:
         if isinstance(self._single, ArrayEstimator) and self._last_frame:
             return self._single.report
         return self._model.processor.report if self._model.processor else None
-
-    def _with_result(self, messages: tuple[ConsensusMessage, ...]) -> Outgoing:
-        """The messages of the rounds, and the estimates of the frames whose rounds are over."""
-        outgoing: Outgoing = messages
-        while self._frames and self._rounds.of(index := min(self._frames)).done:
-            frame = self._frames.pop(index)
-            outgoing += self._finish(frame) if index else self._finish_first(frame)
-            self._done_frame = index
-        return outgoing
 
     def _is_usable(self, index: int, image: UInt8[np.ndarray, "H W 3"]) -> bool:
         """Whether a picture tells anything: a camera that hangs, or that was knocked, is as good as blind."""
@@ -247,7 +227,7 @@ class SmartCamera:
         if frame.since != self._done_frame:
             previous, predicted = self._predict(frame.index)
         # sum: N times the average (Eq. 15-16)
-        lane = self._rounds.of(frame.index)
+        lane = self.rounds.of(frame.index)
         fused = unpack(lane.value, len(lane.members), len(setup.start.mean), setup.fusion)
         self._indefinite["indefinite_fused"] += not fused.is_density
         # reweight, from the prior or the optimal proposal (Eq. 17)
@@ -285,12 +265,12 @@ class SmartCamera:
         self._appearance = self._model.first_appearance(picture, position)
         self._frames[0] = FrameInProgress(0, picture, 0, self._particles, self._particles)
         looks = pack_looks(self._appearance, self._setup.filter.color)
-        return self._with_result(self._rounds.begin(0, looks))
+        return self.rounds.begin(0, looks) + self.on_rounds_over()
 
     def _finish_first(self, frame: FrameInProgress) -> tuple[EstimateMessage, ...]:
         """A camera that saw nothing, or something else, takes the looks that the others saw."""
         color = self._setup.filter.color
-        self._appearance = settled(self._appearance, unpack_looks(self._rounds.of(0).value, color), color)
+        self._appearance = settled(self._appearance, unpack_looks(self.rounds.of(0).value, color), color)
         visible = self._appearance is not None and self._appearance.own
         n = float(self._setup.filter.n_particles)
         message = self._message(frame, self._setup.start.moments, n, visible=visible)
@@ -314,6 +294,6 @@ class SmartCamera:
             visible=visible,
             lost=self._sighting.lost,
             ess=ess,
-            iterations=self._rounds.of(frame.index).rounds_done,
-            members=self._rounds.of(frame.index).members,
+            iterations=self.rounds.of(frame.index).rounds_done,
+            members=self.rounds.of(frame.index).members,
         )

@@ -55,40 +55,39 @@ class DisturbedTransport(ZenohTransport):
         self._now_ns = dict.fromkeys(channels, 0)
         self._due: dict[str, deque[tuple[int, ConsensusMessage]]] = {sender: deque() for sender in channels}
 
-    def receive(self, sender: str, timeout_s: float) -> PeerMessage | LostMessage | None:
+    def _next(self, sender: str) -> PeerMessage | LostMessage | None:
         """The next message of a linked node that its channel has let through by now."""
         if sender not in self._channels:
-            return super().receive(sender, timeout_s)
-        if not self._realtime:
-            return self._receive_in_lockstep(sender, timeout_s)
-        due, deadline = self._due[sender], time.monotonic() + timeout_s
-        while True:
-            for each in self._channels:
-                while isinstance(message := super().receive(each, 0.0), ConsensusMessage):
-                    self._carry(each, message, time.monotonic_ns())
-            if due and due[0][0] <= time.monotonic_ns():
-                return due.popleft()[1]
-            left_s = deadline - time.monotonic()
-            if left_s <= 0 or not (due or self.alive(sender)):
-                return None
-            time.sleep(min(left_s, _LOOK_S))
+            return super()._next(sender)
+        return self._next_due(sender) if self._realtime else self._next_in_lockstep(sender)
 
-    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | LostMessage, ...]:
-        """The next message of each of several linked nodes that its channel has let through by now."""
-        deadline = time.monotonic() + timeout_s
-        came = [self.receive(sender, max(deadline - time.monotonic(), 0.0)) for sender in senders]
-        return tuple([message for message in came if message is not None])
+    def _next_due(self, sender: str) -> ConsensusMessage | None:
+        for each in self._channels:
+            while isinstance(message := super()._next(each), ConsensusMessage):
+                self._carry(each, message, time.monotonic_ns())
+        due = self._due[sender]
+        return due.popleft()[1] if due and due[0][0] <= time.monotonic_ns() else None
 
-    def _receive_in_lockstep(self, sender: str, timeout_s: float) -> PeerMessage | LostMessage | None:
+    def _next_in_lockstep(self, sender: str) -> PeerMessage | LostMessage | None:
         due = self._due[sender]
         if not due:
-            message = super().receive(sender, timeout_s)
+            message = super()._next(sender)
             if not isinstance(message, ConsensusMessage):
                 return message
             self._now_ns[sender] += _FREE_NS
             if not self._carry(sender, message, self._now_ns[sender]):
                 return LostMessage(sender, message.frame, message.round)
         return due.popleft()[1]
+
+    def _may_come(self, sender: str) -> bool:
+        """Whether a node is there to say more, or something of it is on its way."""
+        return super()._may_come(sender) or bool(self._due.get(sender))
+
+    def _wait_until(self, deadline: float) -> bool:
+        """Waits for anything to change, and for what is on its way."""
+        if self._realtime and deadline > (soon := time.monotonic() + _LOOK_S):
+            deadline = soon
+        return super()._wait_until(deadline)
 
     def _carry(self, sender: str, message: ConsensusMessage, now_ns: int) -> int:
         """Puts a message into its channel; returns how often it will come out."""

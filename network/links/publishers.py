@@ -1,7 +1,9 @@
 """What is published over Eclipse Zenoh, and how: by a node, and from outside about a whole run.
 
-Messages of the rounds go first and block; public ones block; pixels and previews give way to all others, and
-previews, in real time pixels as well, are dropped where whoever wants them is too slow.
+Messages of the rounds go first and block, and travel together where several wait, so that a thousand fit into
+Zenoh's queue: the thread that empties it sends them (`network.links.runtime`), and must not wait for itself.
+Public ones block; pixels and previews give way to all others, and previews, in real time pixels as well, are
+dropped where whoever wants them is too slow.
 """
 
 from functools import partial
@@ -45,9 +47,7 @@ def declare_publishers(
         For each kind of message its publisher.
     """
     publish = partial(session.declare_publisher, allowed_destination=Locality.REMOTE)
-    rounds = partial(
-        publish, congestion_control=CongestionControl.BLOCK, priority=Priority.REAL_TIME, express=True
-    )
+    rounds = partial(publish, congestion_control=CongestionControl.BLOCK, priority=Priority.REAL_TIME)
     public = partial(publish, congestion_control=CongestionControl.BLOCK)
     pixels_control = CongestionControl.DROP if drop_late_pixels else CongestionControl.BLOCK
     return {

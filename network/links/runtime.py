@@ -1,4 +1,8 @@
-"""What a node's environment must say before its process starts; light, for whoever starts it."""
+"""What the environment must say before Zenoh's threads start in a process; light, for whoever starts it."""
 
-RUNTIME_ENVIRONMENT = {"ZENOH_RUNTIME": "(rx: (worker_threads: 1))"}
-"""One thread is enough to receive, and saves CPU."""
+ROUTER_RUNTIME = {"ZENOH_RUNTIME": "(rx: (worker_threads: 1))"}
+"""One thread is enough to receive, and saves CPU; it passes on what it hears, and another one sends."""
+NODE_RUNTIME = {"ZENOH_RUNTIME": "(rx: (worker_threads: 1), tx: (handover: rx))"}
+"""The thread that receives also sends: an answer is on its way without another one being woken. Not so in a
+router, which would wait for itself where somebody outside is too slow for what it passes on.
+"""

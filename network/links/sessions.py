@@ -15,6 +15,7 @@ from network.errors import NetworkError
 
 _LEASE_MS = 1000
 _WAIT_BEFORE_CLOSE_US = 200_000  # shorter than the lease, or a stalled link stays dead after reconnection
+_BATCHES = 16  # of 64 KB, the most: two of the largest messages of a round can wait to be sent
 _CLOSE_S = 5.0
 _FOREVER_MS = -1
 
@@ -107,7 +108,10 @@ def _config(
                 "tx": {
                     "lease": _LEASE_MS,
                     "keep_alive": 4,
-                    "queue": {"congestion_control": {"block": {"wait_before_close": _WAIT_BEFORE_CLOSE_US}}},
+                    "queue": {
+                        "size": {"real_time": _BATCHES},
+                        "congestion_control": {"block": {"wait_before_close": _WAIT_BEFORE_CLOSE_US}},
+                    },
                 }
             },
         },

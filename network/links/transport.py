@@ -6,7 +6,7 @@ many nodes in one thread; both count alike.
 
 import logging
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
@@ -120,6 +120,10 @@ class LostMessage:
     round: int
 
 
+Take = Callable[[PeerMessage | LostMessage], Iterable[ConsensusMessage]]
+"""What a node does with a neighbour's message: it answers with some of its own, or none."""
+
+
 @runtime_checkable
 class Transport(Protocol):
     """A node's way to the others.
@@ -160,18 +164,18 @@ class Transport(Protocol):
             Its message, that it was lost where that is known, None when time is up or the sender is gone.
         """
 
-    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | LostMessage, ...]:
-        """The next message of each of several nodes that are linked to this one.
+    def exchange(self, take: Take, awaited: Callable[[], Sequence[str]], timeout_s: float) -> None:
+        """Hears neighbours and answers them, until nobody is awaited, one of these is gone, or time is up.
 
-        All are read when the last one is there. Who reads each as it comes is woken for every one, and finds
-        its caches filled by others.
+        Both functions are called wherever a message comes, one call at a time, and must be quick.
 
         Args:
-            senders: The nodes.
-            timeout_s: How long to wait for them all together; 0 only looks.
+            take: Takes the next message of a node that is awaited, or that it is lost; returns what to send.
+            awaited: The nodes from whom a message is wanted now, in the order in which they are read.
+            timeout_s: How long at most; 0 only reads what has come.
 
-        Returns:
-            Their messages, in the order of the senders, without those that are gone, silent or refused.
+        Raises:
+            Exception: What one of the functions has raised.
         """
 
     def offer(self, state: StateMessage) -> None:

@@ -1,24 +1,24 @@
 """A node's transport over Eclipse Zenoh: what it hears, who is there, and how it waits.
 
-``receive`` waits in Zenoh's own channels, which is faster than callbacks but knows no time-out. What ends the
-wait is an empty message that the node puts into the channel itself: the watchdog when time is up, liveliness
-when the sender is gone. Whoever receives it looks again whether there is anything left to wait for.
+Zenoh's thread puts what it receives into inboxes. During an ``exchange`` it passes it on and sends the
+answers itself: no other thread is woken until the exchange is over. The README says what that saves, and why
+what it sends cannot hold it up.
 """
 
-import contextlib
 import queue
 import threading
 import time
-from collections.abc import Iterable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 import zenoh
-from zenoh import Locality
 
 from network.errors import RefusedMessage
-from network.links import sessions
+from network.links import sessions, threads
 from network.links.answers import Answers
 from network.links.publishers import declare_publishers
-from network.links.transport import Links, LostMessage, Traffic
+from network.links.transport import Links, LostMessage, Take, Traffic
 from network.wire import codec, keys
 from network.wire.messages import (
     ConfirmMessage,
@@ -34,12 +34,6 @@ from network.wire.messages import (
 
 _DEPTHS: dict[type[PeerMessage], int] = {ConsensusMessage: 64, ConfirmMessage: 64, PixelsMessage: 4}
 _KEYS = {ConsensusMessage: keys.consensus, ConfirmMessage: keys.confirm, PixelsMessage: keys.pixels}
-_WATCH_PERIOD_S = 0.01
-_WATCH_CLOSELY_S = 0.002
-"""The watchdog's period while somebody waits whose time is nearly up."""
-_WAKE_UP = b""
-
-_Inbox = zenoh.Subscriber[zenoh.handlers.Handler[zenoh.Sample]]
 
 
 class ZenohTransport:
@@ -76,14 +70,13 @@ class ZenohTransport:
         self.counters = Traffic()
         self._run, self._name, self._links = run, name, links
         self._heard = links.heard()
-        self._inbox_keys = {sender: _KEYS[kind](run, sender) for sender, kind in self._heard.items()}
         self._token_key = keys.alive(run, name)
         self._alive: set[str] = set()
         self._receivers: dict[type, tuple[str, ...]] = dict.fromkeys(links.receivers(), ())  # that are alive
-        self._alive_changed = threading.Condition()
+        self._changed = threading.Condition()  # what has come, who is there: held whenever either is touched
+        self._exchange: tuple[Take, Callable[[], Sequence[str]]] | None = None  # under way
+        self._failure: Exception | None = None  # of an exchange, in Zenoh's thread
         self._orders: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-        self._wait: tuple[str, float] | None = None
-        self._closed = threading.Event()
         self._session = sessions.open_peer(listen, connect)
         self._inboxes = {sender: self._declare_inbox(sender) for sender in self._heard}
         self._declare_orders()
@@ -91,7 +84,6 @@ class ZenohTransport:
         self._publishers = declare_publishers(self._session, run, name, drop_late_pixels=drop_late_pixels)
         self._publishers[PreviewMessage].declare_matching_listener(zenoh.handlers.Callback(self._on_watched))
         self._declare_liveliness()
-        threading.Thread(target=self._watch, name="watchdog", daemon=True).start()
 
     def announce(self) -> None:
         """Tells everybody that this node hears: from here on messages to it arrive."""
@@ -104,8 +96,8 @@ class ZenohTransport:
     def wait_until_alive(self, names: Iterable[str], timeout_s: float) -> tuple[str, ...]:
         """Waits until nodes are alive; returns those that are still missing when time is up."""
         names = tuple(names)
-        with self._alive_changed:
-            self._alive_changed.wait_for(lambda: self._alive.issuperset(names), timeout_s)
+        with self._changed:
+            self._changed.wait_for(lambda: self._alive.issuperset(names), timeout_s)
             return tuple(name for name in names if name not in self._alive)
 
     def wait_for_control(self, timeout_s: float) -> ControlMessage | None:
@@ -145,50 +137,67 @@ class ZenohTransport:
     def receive(self, sender: str, timeout_s: float) -> PeerMessage | LostMessage | None:
         """The next valid message of a linked node, None when time is up or the sender is gone."""
         deadline = time.monotonic() + timeout_s
-        while (data := self._next(sender, deadline)) is not None:
-            message = self._read(sender, data)
-            if message is not None:
-                return message
-        return None
+        with self._changed:
+            while (message := self._next(sender)) is None and self._may_come(sender):
+                if not self._wait_until(deadline):
+                    break
+            return message
 
-    def receive_each(self, senders: Sequence[str], timeout_s: float) -> tuple[PeerMessage | LostMessage, ...]:
-        """The next message of each of several linked nodes, but of those that are gone, silent or refused."""
+    def exchange(self, take: Take, awaited: Callable[[], Sequence[str]], timeout_s: float) -> None:
+        """Hears neighbours and answers them in Zenoh's thread, until nobody is awaited, or can be."""
         deadline = time.monotonic() + timeout_s
-        came = [(sender, self._next(sender, deadline)) for sender in senders]
-        read = [self._read(sender, data) for sender, data in came if data is not None]
-        return tuple([message for message in read if message is not None])
+        with self._changed:
+            self._exchange = (take, awaited)
+            try:
+                while self._pass_on() and all(self._may_come(sender) for sender in awaited()):
+                    if not self._wait_until(deadline):
+                        break
+            finally:
+                self._exchange = None
+            failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
 
-    def _next(self, sender: str, deadline: float) -> bytes | None:
-        """The next bytes of a linked node, None when time is up or it is gone."""
+    def _pass_on(self) -> bool:
+        """Passes on what has come from those who are awaited; returns whether somebody still is."""
+        if self._exchange is None:
+            return False
+        take, awaited = self._exchange
+        while senders := awaited():
+            for sender in senders:
+                message = self._next(sender)
+                if message is not None:
+                    for answer in take(message):
+                        self.send(answer)
+                    break
+            else:
+                return True
+        return False
+
+    def _next(self, sender: str) -> PeerMessage | LostMessage | None:
+        """The next valid message of a linked node that is here; None where there is none."""
         inbox = self._inboxes[sender]
-        # what has come already needs no watchdog
-        while (sample := inbox.try_recv() or self._await(sender, deadline)) is not None:
-            data = sample.payload.to_bytes()
-            if data != _WAKE_UP:
-                return data
+        while inbox:
+            try:
+                message = codec.decode(
+                    self._heard[sender], self._run, sender, inbox.popleft().payload.to_bytes()
+                )
+            except RefusedMessage as refusal:
+                self.counters.refuse(sender, refusal.reason)
+                continue
+            if isinstance(message, ConsensusMessage):
+                self.counters.received[sender] += 1
+            return message
         return None
 
-    def _await(self, sender: str, deadline: float) -> zenoh.Sample | None:
-        """The next sample, a wake-up perhaps; None when time is up or the sender is gone."""
-        inbox = self._inboxes[sender]
-        if sender not in self._alive or time.monotonic() >= deadline:
-            return inbox.try_recv()  # its last words may have come just before it left
-        self._wait = (sender, deadline)
-        try:
-            return inbox.recv()
-        finally:
-            self._wait = None
+    def _may_come(self, sender: str) -> bool:
+        """Whether a node is there to say more."""
+        return sender in self._alive
 
-    def _read(self, sender: str, data: bytes) -> PeerMessage | None:
-        """The message in a linked node's bytes; None, counted, where there is none."""
-        try:
-            message = codec.decode(self._heard[sender], self._run, sender, data)
-        except RefusedMessage as refusal:
-            self.counters.refuse(sender, refusal.reason)
-            return None
-        if isinstance(message, ConsensusMessage):
-            self.counters.received[sender] += 1
-        return message
+    def _wait_until(self, deadline: float) -> bool:
+        """Waits for anything to change; returns whether there was time left."""
+        left_s = deadline - time.monotonic()
+        return left_s > 0 and (self._changed.wait(left_s) or True)
 
     def offer(self, state: StateMessage) -> None:
         """Keeps what this node knows, for neighbours that ask."""
@@ -200,12 +209,27 @@ class ZenohTransport:
 
     def close(self) -> None:
         """Leaves the network, within seconds whatever the others do."""
-        self._closed.set()
         sessions.close(self._session)
 
-    def _declare_inbox(self, sender: str) -> _Inbox:
-        depth = _DEPTHS[self._heard[sender]]
-        return self._session.declare_subscriber(self._inbox_keys[sender], zenoh.handlers.RingChannel(depth))
+    def _declare_inbox(self, sender: str) -> deque[zenoh.Sample]:
+        """Where a node's messages wait for this one: the latest, if it does not read them."""
+        kind = self._heard[sender]
+        inbox = deque[zenoh.Sample](maxlen=_DEPTHS[kind])
+        heard = zenoh.handlers.Callback(partial(self._on_sample, inbox), indirect=False)
+        self._session.declare_subscriber(_KEYS[kind](self._run, sender), heard)
+        return inbox
+
+    def _on_sample(self, inbox: deque[zenoh.Sample], sample: zenoh.Sample) -> None:
+        """In Zenoh's thread: a message has come, and rounds go on right here where they wait for it."""
+        threads.keep_state()
+        with self._changed:
+            inbox.append(sample)
+            try:
+                goes_on = self._pass_on()
+            except Exception as error:  # noqa: BLE001 - raised again where the node waits
+                self._failure, goes_on = error, False
+            if not goes_on:
+                self._changed.notify()
 
     def _declare_orders(self) -> None:
         self._session.declare_subscriber(keys.control(self._run), zenoh.handlers.Callback(self._on_order))
@@ -230,7 +254,7 @@ class ZenohTransport:
             name = keys.node_of(str(sample.key_expr))
         except ValueError:  # somebody else's token
             return
-        with self._alive_changed:
+        with self._changed:
             if sample.kind == zenoh.SampleKind.PUT:
                 self._alive.add(name)
             else:
@@ -239,29 +263,4 @@ class ZenohTransport:
                 kind: tuple(other for other in others if other in self._alive)
                 for kind, others in self._links.receivers().items()
             }
-            self._alive_changed.notify_all()
-        if sample.kind == zenoh.SampleKind.DELETE:
-            self._wake(name)
-
-    def _watch(self) -> None:
-        """Wakes the waiting node when its time is up."""
-        woken = None
-        period_s = _WATCH_PERIOD_S
-        while not self._closed.wait(period_s):
-            wait = self._wait
-            left_s = _WATCH_PERIOD_S if wait is None else wait[1] - time.monotonic()
-            period_s = _WATCH_CLOSELY_S if left_s < _WATCH_PERIOD_S else _WATCH_PERIOD_S
-            if wait is None or wait is woken:
-                continue
-            sender, deadline = wait
-            if time.monotonic() >= deadline:
-                woken = wait
-                self._wake(sender)
-
-    def _wake(self, sender: str) -> None:
-        """Puts an empty message into a sender's inbox, for whoever waits there."""
-        if sender in self._inbox_keys:
-            with contextlib.suppress(zenoh.ZError):  # the session is closing: nobody waits any more
-                self._session.put(
-                    self._inbox_keys[sender], _WAKE_UP, allowed_destination=Locality.SESSION_LOCAL
-                )
+            self._changed.notify_all()

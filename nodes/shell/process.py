@@ -11,7 +11,7 @@ from threading import Event
 import numpy as np
 from jaxtyping import UInt8
 
-from network.links.transport import Links, LostMessage, Transport
+from network.links.transport import Links, Transport
 from network.wire.messages import (
     ConfirmMessage,
     ConsensusMessage,
@@ -32,8 +32,6 @@ REPORT_PERIOD_S = 1.0
 """How often a node tells how it is, while somebody looks."""
 PATIENCE_S = 0.25
 """How long a wait lasts at most before the shell looks whether it has been told to stop."""
-TURN_S = 0.005
-"""How long it waits for one frame's messages where the rounds of several are under way."""
 
 
 class Shell:
@@ -198,47 +196,42 @@ def _rounds(node: SmartCamera, begun: dict[int, float], shell: Shell, frame: int
         shell: Its shell.
         frame: In real time, the frame at whose time the rounds of those before it are left for later.
     """
-    began, rounds = time.perf_counter(), node.rounds_done
+    began, rounds = time.perf_counter(), node.rounds.done
     realtime = shell.pace.kind == "realtime"
-    while (under_way := list(node.open_rounds)) and not shell.stopped:
+    while not shell.stopped:
+        # the fusion filter, where a frame's rounds are over
+        _send(node.on_rounds_over(), shell)
+        if not node.open_rounds:
+            break
         left_s = shell.begins_in_s(frame) if frame is not None and realtime else PATIENCE_S
         if left_s <= 0:
             break
-        for index in under_way:
-            patience_s = min(left_s, PATIENCE_S if len(under_way) == 1 else TURN_S)
-            _wait(node, index, begun[index], patience_s, shell)
+        # rounds, as the neighbours' messages come
+        left_s = min(
+            left_s, PATIENCE_S, *(end - time.monotonic() for end in _ends(node, begun, shell).values())
+        )
+        shell.transport.exchange(node.rounds.take, node.awaited, left_s)
+        # those who are gone, or late
+        gone = sorted({name for name in node.awaited() if not shell.transport.alive(name)})
+        for name in gone:
+            _send(node.on_lost(name), shell)
+        for each, end in {} if gone else _ends(node, begun, shell).items():
+            if time.monotonic() >= end:
+                _send(node.on_round_deadline(each), shell)
     # those of which the time is up
-    for index in list(node.open_rounds):
-        if frame is not None and index + shell.pace.lag_frames < frame:
+    for each in list(node.open_rounds):
+        if frame is not None and each + shell.pace.lag_frames < frame:
             shell.telemetry.late += 1
-            _send(node.on_deadline(index), shell)
-    rounds = max(node.rounds_done - rounds, 1)
+            _send(node.on_deadline(each), shell)
+    rounds = max(node.rounds.done - rounds, 1)
     shell.telemetry.consensus_round_s.append((time.perf_counter() - began) / rounds)
 
 
-def _wait(node: SmartCamera, index: int, begun: float, patience_s: float, shell: Shell) -> None:
-    """Waits for the messages of a frame's round, or for its end."""
-    round_ = node.open_rounds.get(index)
-    if round_ is None:
-        return
-    neighbors = node.waiting_for(index)
-    deadline = begun + shell.pace.round_deadline_s(round_)
-    left_s = max(deadline - time.monotonic(), 0.0)
-    messages = shell.transport.receive_each(neighbors, min(left_s, patience_s))
-    for message in messages:
-        if isinstance(message, ConsensusMessage):
-            _send(node.on_message(message), shell)
-        elif isinstance(message, LostMessage):
-            _send(node.on_lost_message(message), shell)
-    if len(messages) == len(neighbors):
-        return
-    # those who are gone, or late
-    silent = set(neighbors).difference(message.sender for message in messages)
-    gone = sorted(name for name in silent if not shell.transport.alive(name))
-    for name in gone:
-        _send(node.on_lost(name), shell)
-    if not gone and time.monotonic() >= deadline and node.open_rounds.get(index) == round_:
-        _send(node.on_round_deadline(index), shell)
+def _ends(node: SmartCamera, begun: dict[int, float], shell: Shell) -> dict[int, float]:
+    """When the rounds that the node is in are over whatever has come, by frame, on the monotonic clock."""
+    return {
+        each: begun[each] + shell.pace.round_deadline_s(round_) for each, round_ in node.open_rounds.items()
+    }
 
 
 def _await_confirmation(sink: str, frame: int, confirmed: float, shell: Shell) -> float:

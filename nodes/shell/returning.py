@@ -9,7 +9,7 @@ some are, the network was in parts, and those that are ahead wait.
 import time
 from collections.abc import Iterable
 
-from network.links.transport import LostMessage, Transport
+from network.links.transport import Transport
 from network.wire.messages import ConsensusMessage, StateMessage
 from nodes.shell.pace import Pace
 from nodes.smart_camera import SmartCamera
@@ -51,18 +51,17 @@ class Returning:
             index: Its next frame.
         """
         for name in self._there():
-            # Between two frames, nothing is said in return.
             while (message := self._transport.receive(name, 0)) is not None:
-                if isinstance(message, ConsensusMessage):
-                    node.on_message(message)
-                    # Parts of a network that hear each other again: who is ahead waits for the others.
-                    if self._pace.kind == "lockstep" and message.frame < index:
-                        node.on_behind(name)
-                elif isinstance(message, LostMessage):
-                    node.on_lost_message(message)
+                # where frames overlap, rounds go on meanwhile
+                for said in node.rounds.take(message):
+                    self._transport.send(said)
+                # Parts of a network that hear each other again: who is ahead waits for the others.
+                behind = isinstance(message, ConsensusMessage) and message.frame < index
+                if behind and self._pace.kind == "lockstep":
+                    node.rounds.restore(name)
         if self._pace.kind == "lockstep":
             self._wait_for_company()
-        heard = [node.heard[name] for name in self._there()]
+        heard = [node.rounds.heard[name] for name in self._there()]
         # In real time frames are left out all the time; only what is long away knows less than the others.
         patience = 0 if self._pace.kind == "lockstep" else LEAD + self._pace.lag_frames
         return self.newest() if heard and min(heard) > index + patience else None

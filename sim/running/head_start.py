@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 
-from network.links.runtime import RUNTIME_ENVIRONMENT
+from network.links.runtime import ROUTER_RUNTIME
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -23,7 +23,7 @@ def start_host() -> None:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            env=os.environ | RUNTIME_ENVIRONMENT | ONE_THREAD,
+            env=os.environ | ROUTER_RUNTIME | ONE_THREAD,
             # Ctrl-C in the terminal is the launcher's business.
             start_new_session=True,
         )

@@ -1,5 +1,6 @@
 """One node of a run, in a process of its own: forked by the run's host, or started by hand."""
 
+import os
 import signal
 import threading
 from collections.abc import Sequence
@@ -9,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from network.links.conditions import Channel
 from network.links.disturbed import DisturbedTransport
+from network.links.runtime import NODE_RUNTIME
 from network.links.transport import Transport
 from network.links.zenoh import ZenohTransport
 from nodes.shell.process import Shell, run_camera, run_central
@@ -38,6 +40,7 @@ def run_node(
     if name not in assembly.links:
         raise ScenarioError(f"{scenario.name} has no node {name}: its nodes are {', '.join(assembly.links)}")
     # One thread a process: as many processes as cameras share the cores.
+    os.environ.update(NODE_RUNTIME)
     cv2.setNumThreads(1)
     threadpool_limits(1)
     links = assembly.links[name]

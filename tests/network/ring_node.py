@@ -3,7 +3,6 @@
 Usage: ring_node.py JSON, with run, name, names, directory, frames, iterations.
 """
 
-import itertools
 import json
 import os
 import signal
@@ -33,12 +32,11 @@ def rounds(transport, consensus, frame, value):
     for message in consensus.begin(frame, value):
         transport.send(message)
     while not consensus.done:
-        awaited = consensus.waiting_for()
-        messages = transport.receive_each(awaited, timeout_s=2.0)
-        replies = [consensus.receive(message) for message in messages]
-        replies += [consensus.drop(name) for name in set(awaited) - {message.sender for message in messages}]
-        for reply in itertools.chain(*replies):
-            transport.send(reply)
+        transport.exchange(consensus.receive, consensus.waiting_for, timeout_s=2.0)
+        for name in consensus.waiting_for():
+            if not transport.alive(name):
+                for reply in consensus.drop(name):
+                    transport.send(reply)
 
 
 def estimate(run, name, frame, consensus):

@@ -147,13 +147,33 @@ def test_at_the_deadline_the_rounds_done_must_do(room):
     bench.start(1, ("C1", "C2"))  # the others are late
     bench.deliver()
     node = bench.nodes["C1"]
-    assert node.waiting_for(1) == ("C4",)
+    assert node.awaited() == ("C4",)
     bench.hear("C1", node.on_deadline(1))
     cut = bench.estimates[1, "C1", "dcpf"]
-    assert cut.iterations == node.rounds_done - N_ROUNDS < N_ROUNDS
+    assert cut.iterations == node.rounds.done - N_ROUNDS < N_ROUNDS
     assert bench.error(1, "C1") < 0.3
-    assert node.waiting_for(1) == ()
+    assert node.awaited() == ()
     assert node.on_deadline(1) == ()  # the frame is over already
+
+
+def test_the_rounds_go_on_by_themselves_and_the_second_half_waits_for_who_asks(room):
+    bench, beside = Bench(room()), Bench(room())
+    for each in (bench, beside):
+        each.frame(0)
+        each.start(1, NAMES)
+    beside.deliver()
+    while busy := [link for link, queue in bench.links.items() if queue]:
+        _, receiver = link = busy[0]
+        bench.hear(receiver, bench.nodes[receiver].rounds.take(bench.links[link].pop(0)))
+    for name, node in bench.nodes.items():
+        assert node.awaited() == ()
+        assert (1, name, "dcpf") not in bench.estimates
+        bench.hear(name, node.on_rounds_over())
+        assert bench.estimates[1, name, "dcpf"].iterations == N_ROUNDS
+        np.testing.assert_array_equal(
+            bench.estimates[1, name, "dcpf"].mean, beside.estimates[1, name, "dcpf"].mean
+        )
+        assert node.on_rounds_over() == ()
 
 
 def test_a_camera_that_sees_nothing_is_told_the_looks_and_sends_nothing_but_zeros(room):

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 
-from network.links.runtime import RUNTIME_ENVIRONMENT
+from network.links.runtime import NODE_RUNTIME
 from sim.running.children import RunFailed
 
 SHAPES = ("ring", "grid")
@@ -57,7 +57,7 @@ def _measure(shape: str, n: int, turns: int) -> dict[str, float]:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ | RUNTIME_ENVIRONMENT,
+            env=os.environ | NODE_RUNTIME,
         )
         try:
             stdout, stderr = process.communicate(timeout=LIMIT_S)

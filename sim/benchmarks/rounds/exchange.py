@@ -15,11 +15,11 @@ from zenoh import CongestionControl, Locality, Priority
 from network.averaging.metropolis import MetropolisWeights
 from network.graphs.graph import Graph
 from network.links import sessions
-from network.links.transport import Links
+from network.links.transport import Links, LostMessage
 from network.links.zenoh import ZenohTransport
 from network.rounds.consensus import Consensus
 from network.wire import codec, keys
-from network.wire.messages import ConsensusMessage
+from network.wire.messages import ConsensusMessage, PeerMessage
 
 N_NUMBERS = 5
 """What the net information has on a plane."""
@@ -60,15 +60,13 @@ class ConsensusRounds:
         consensus = self._consensus
         for said in consensus.begin(self._frame, np.arange(N_NUMBERS, dtype=float)):
             self._transport.send(said)
-        while waiting := consensus.waiting_for():
-            messages = self._transport.receive_each(waiting, PATIENCE_S)
-            if not messages:
-                raise TimeoutError(f"{consensus.name} heard nothing of {', '.join(waiting)}")
-            for message in messages:
-                if isinstance(message, ConsensusMessage):
-                    for reply in consensus.receive(message):
-                        self._transport.send(reply)
+        self._transport.exchange(self._take, consensus.waiting_for, PATIENCE_S)
+        if not consensus.done:
+            raise TimeoutError(f"{consensus.name} heard nothing of {', '.join(consensus.waiting_for())}")
         self._frame += 1
+
+    def _take(self, message: PeerMessage | LostMessage) -> tuple[ConsensusMessage, ...]:
+        return self._consensus.receive(message) if isinstance(message, ConsensusMessage) else ()
 
     def close(self) -> None:
         """Leaves the network."""

@@ -7,6 +7,7 @@ import json
 import os
 import sys
 import time
+import traceback
 from collections import deque
 from statistics import median
 from typing import Any
@@ -41,6 +42,8 @@ def main() -> int:
             try:
                 _be_node(name, graph, order, PlainSockets(_RUN, name, ends[name]), write, hold_read)
                 code = 0
+            except Exception:  # noqa: BLE001 - of whatever kind: who started the processes reads it
+                traceback.print_exc()
             finally:
                 os._exit(code)
         os.close(write)
