@@ -240,9 +240,15 @@ def decode_preview(data: bytes) -> PreviewMessage:
     return replace(message, jpeg=picture)
 
 
+@lru_cache
+def upper_triangle(size: int) -> tuple[Int[np.ndarray, " K"], Int[np.ndarray, " K"]]:
+    """Rows and columns of a matrix's upper triangle, row by row."""
+    return np.triu_indices(size)
+
+
 def pack_symmetric(matrix: Float[np.ndarray, "*C D D"]) -> Float[np.ndarray, "*C K"]:
     """The upper triangle of a symmetric matrix, or of each of many, row by row; K = D (D + 1) / 2."""
-    rows, columns = np.triu_indices(matrix.shape[-1])
+    rows, columns = upper_triangle(matrix.shape[-1])
     return matrix[..., rows, columns]
 
 
@@ -272,7 +278,7 @@ def _numbers(encoding: Encoding, size: int) -> struct.Struct:
 def _places(size: int) -> Int[np.ndarray, "D D"]:
     """Where in the upper triangle each entry of the matrix stands."""
     places = np.zeros((size, size), dtype=np.intp)
-    rows, columns = np.triu_indices(size)
+    rows, columns = upper_triangle(size)
     places[rows, columns] = places[columns, rows] = np.arange(len(rows))
     return places
 
