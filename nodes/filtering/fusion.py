@@ -34,10 +34,10 @@ RuleName = Literal[
 class FusionOptions(Options):
     """How the cameras' results become one."""
 
-    rule: RuleName = "net_information"
+    rule: RuleName = "quadratic_fit"
     """`eq17`: the ratio N(u, p)/N(v, r) as printed; `net_information`: its part that is a density, on the
-    position; `quadratic_fit`: a concave quadratic fitted to the log-likelihood over the particles. To compare
-    with: `naive`, the mean of the estimates; `covariance_intersection`; `hybrid` consensus on measurements
+    position; `quadratic_fit`: the same, read off the log-likelihood by a concave quadratic that is fitted to it
+    over the particles. To compare with: `naive`, the mean of the estimates; `covariance_intersection`; `hybrid` consensus on measurements
     and information; `icf`, the information-weighted consensus filter."""
     local_particles: Literal["own", "shared"] = "shared"
     """`own`: the local filter keeps particles of its own, as the text has it; `shared`: it weights the fusion

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from network.wire.codec import upper_triangle
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moments:
@@ -128,17 +130,19 @@ def fit_log_quadratic(
         weights: Where the fit has to be good; adds up to one.
     """
     n_axes = positions.shape[1]
-    if np.all(log_likelihoods == log_likelihoods[0]):
+    if (log_likelihoods == log_likelihoods[0]).all():
         return no_information(n_axes)
+    # one row a component: NumPy is quick along the long axis only
     center = weights @ positions
-    scale = np.sqrt(weights @ (positions - center) ** 2) + 1e-9
-    y = (positions - center) / scale
-    # ℓ ≈ c + yᵀη - ½ yᵀΛy
-    i, j = np.triu_indices(n_axes)
-    columns = np.column_stack([np.ones(len(y)), y, -np.where(i == j, 0.5, 1.0) * y[:, i] * y[:, j]])
-    root = np.sqrt(weights)[:, None]
-    coefficients, _, rank, _ = np.linalg.lstsq(columns * root, log_likelihoods * root[:, 0], rcond=None)
-    if rank < columns.shape[1]:
+    y = np.array((positions - center).T, order="C")
+    scale = np.sqrt((y * y) @ weights) + 1e-9
+    y /= scale[:, None]
+    # ℓ ≈ c + yᵀη - ½ yᵀΛy, least squares by its normal equations: y has mean 0 and variance 1
+    i, j = upper_triangle(n_axes)
+    terms = np.vstack([np.ones_like(log_likelihoods), y, np.where(i == j, -0.5, -1.0)[:, None] * y[i] * y[j]])
+    weighted = terms * weights
+    coefficients, _, rank, _ = np.linalg.lstsq(weighted @ terms.T, weighted @ log_likelihoods, rcond=1e-12)
+    if rank < len(terms):
         return no_information(n_axes)
     matrix = np.zeros((n_axes, n_axes))
     matrix[i, j] = matrix[j, i] = coefficients[1 + n_axes :]
@@ -148,5 +152,5 @@ def fit_log_quadratic(
     matrix = (V * np.where(falls, curvature, 0.0)) @ V.T
     vector = V @ np.where(falls, V.T @ coefficients[1 : 1 + n_axes], 0.0)
     # back from y to x
-    matrix = matrix / np.outer(scale, scale)
+    matrix = matrix / scale / scale[:, None]
     return Information(matrix, vector / scale + matrix @ center)

@@ -30,7 +30,7 @@ class LikelihoodOptions(Options):
     """d₀²: the squared distance at which the target counts as not seen (fixed)."""
     background_fraction: float = Field(default=0.5, gt=0)
     """d₀² as a fraction of the median d² of the target's surroundings (background)."""
-    background_ratio: float = Field(default=36.0, gt=0)
+    background_ratio: float = Field(default=48.0, gt=0)
     """d₀²/σ² (background)."""
 
 

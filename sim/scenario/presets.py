@@ -41,9 +41,9 @@ ROBUST: Mapping[str, Any] = {
         "model_update": {"alpha": 0.05},
         "min_likeness": 0.5,
     },
-    "fusion": {"rule": "net_information", "local_particles": "shared", "proposal": "optimal"},
+    "fusion": {"rule": "quadratic_fit", "local_particles": "shared", "proposal": "optimal"},
 }
-"""Joint colours without the camera's gain, a likelihood set from the background, net information."""
+"""Joint colours without the camera's gain, a likelihood set from the background, and its quadratic fit exchanged."""
 
 ONE_CAMERA: Mapping[str, Any] = {
     "target": {"start": {"position_error": 1.0, "position_deviation": 2.0, "velocity_deviation": 30.0}},

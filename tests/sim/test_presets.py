@@ -14,7 +14,7 @@ def test_the_robust_preset_is_the_one_where_none_is_named(small):
     named = load_scenario(small, [("preset", "robust")])
 
     assert unsaid == named
-    assert unsaid.fusion.rule == "net_information"
+    assert unsaid.fusion.rule == "quadratic_fit"
     assert isinstance(unsaid.network.consensus, MetropolisWeights)
 
 
