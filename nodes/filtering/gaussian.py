@@ -52,8 +52,10 @@ def regularized(covariance: Float[np.ndarray, "*C D D"], ridge: float) -> Float[
         covariance: Of a sample; positive semidefinite up to rounding.
         ridge: Added to the diagonal, above 0; a little of the trace is as well, for a ridge below rounding.
     """
-    trace = np.asarray(np.trace(covariance, axis1=-2, axis2=-1))[..., None, None]
-    return covariance + (ridge + 1e-12 * trace) * np.eye(covariance.shape[-1])
+    added = covariance.copy()
+    diagonal = np.einsum("...ii->...i", added)
+    diagonal += ridge + 1e-12 * diagonal.sum(axis=-1, keepdims=True)
+    return added
 
 
 def no_information(n: int) -> Information:

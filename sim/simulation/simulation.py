@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy.special import ndtr
 from threadpoolctl import threadpool_limits
 
 from network.averaging import matrices
@@ -127,11 +128,10 @@ def _sense(
     middle = truth[:, : target.n_axes]
     if target.n_axes == 2:
         middle = np.hstack([middle, np.full((n_frames, 1), target.plane_height + target.height / 2)])
-    luck, noise = np.empty((n_frames, n_cameras)), np.empty((n_frames, n_cameras, 2))
-    for row in range(n_frames):
-        frame = str(first + row)
-        stream(scenario.seed, "sensor", "occlusion", frame).random(out=luck[row])
-        stream(scenario.seed, "sensor", "noise", frame).standard_normal(out=noise[row])
+    draws = np.empty((n_frames, n_cameras, 3))
+    for frame, row in enumerate(draws, start=first):
+        stream(scenario.seed, "sensor", str(frame)).standard_normal(out=row)
+    luck, noise = ndtr(draws[:, :, 0]), draws[:, :, 1:]
     told, seen = measure(sensors, middle, target.n_axes, scenario.sensor, luck, noise)
     return with_all(told), seen
 

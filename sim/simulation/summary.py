@@ -46,6 +46,10 @@ class Simulated:
     disagreement: list[float] = field(default_factory=list)
     residual: list[float] = field(default_factory=list)
     last: Moments | None = None
+    _orders: np.random.Generator = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._orders = stream(self.scenario.seed, "disagreement")
 
     def add(self, frames: SimulatedFrames) -> None:
         """Takes a block of frames."""
@@ -66,9 +70,7 @@ class Simulated:
     def _disagreement(self, positions: Float[np.ndarray, "T C A"]) -> list[float]:
         """Mean distance of nodes next to each other in a random order: of all pairs, there are too many."""
         n_frames, n_cameras, _ = positions.shape
-        orders = np.empty((n_frames, n_cameras), dtype=int)
-        for row, order in enumerate(orders, start=len(self.truth) + 1):
-            order[:] = stream(self.scenario.seed, "disagreement", str(row)).permutation(n_cameras)
+        orders = self._orders.permuted(np.tile(np.arange(n_cameras), (n_frames, 1)), axis=1)
         shuffled = np.take_along_axis(positions, orders[:, :, None], axis=1)
         apart = np.linalg.norm(shuffled - np.roll(shuffled, 1, axis=1), axis=2)
         return apart.mean(axis=1).tolist()

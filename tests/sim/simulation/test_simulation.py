@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 from typer.testing import CliRunner
 
 from network.streams import stream
@@ -53,12 +54,8 @@ def kalman(scenario):
     for frame in range(1, scenario.frames):
         mean, P = motion.F @ mean, motion.F @ P @ motion.F.T + np.diag(motion.variances)
         middle = np.array([*assembly.truth[frame, :2], scenario.target.height / 2])
-        n = len(sensors.K)
-        told, seen = measure(
-            sensors, middle, 2, scenario.sensor,
-            stream(scenario.seed, "sensor", "occlusion", str(frame)).random(n),
-            stream(scenario.seed, "sensor", "noise", str(frame)).standard_normal((n, 2)),
-        )  # fmt: skip
+        draws = stream(scenario.seed, "sensor", str(frame)).standard_normal((len(sensors.K), 3))
+        told, seen = measure(sensors, middle, 2, scenario.sensor, norm.cdf(draws[:, 0]), draws[:, 1:])
         for matrix, vector in zip(told.matrix[seen], told.vector[seen], strict=True):
             R = np.linalg.inv(matrix)
             gain = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
