@@ -197,7 +197,10 @@ class ZenohTransport:
     def _wait_until(self, deadline: float) -> bool:
         """Waits for anything to change; returns whether there was time left."""
         left_s = deadline - time.monotonic()
-        return left_s > 0 and (self._changed.wait(left_s) or True)
+        if left_s <= 0:
+            return False
+        self._changed.wait(left_s)
+        return True
 
     def offer(self, state: StateMessage) -> None:
         """Keeps what this node knows, for neighbours that ask."""
@@ -227,7 +230,7 @@ class ZenohTransport:
             try:
                 goes_on = self._pass_on()
             except Exception as error:  # noqa: BLE001 - raised again where the node waits
-                self._failure, goes_on = error, False
+                self._failure, self._exchange, goes_on = error, None, False
             if not goes_on:
                 self._changed.notify()
 
