@@ -218,13 +218,10 @@ class ObservationModel:
             return self._on_array(picture, boxes, pattern, self.processor)
         if self.options.threads == 1:
             return self._share_distances(picture, boxes, pattern)
-        distances = np.empty(len(boxes))
-
-        def measure(share: slice) -> None:
-            distances[share] = self._share_distances(picture, boxes[share], pattern)
-
-        in_shares(measure, len(boxes), self.options.threads, LEAST_BOXES)
-        return distances
+        return in_shares(
+            lambda share: self._share_distances(picture, boxes[share], pattern),
+            *(len(boxes), self.options.threads, LEAST_BOXES),
+        )
 
     def _share_distances(
         self, picture: Picture, boxes: Float[np.ndarray, "N 4"], pattern: Pattern
