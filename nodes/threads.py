@@ -9,32 +9,39 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 
+import numpy as np
+from jaxtyping import Shaped
+
 
 def n_shares(n: int, n_threads: int, least: int) -> int:
     """Threads that n particles keep busy: no more than `n_threads`, each with `least` or more."""
     return max(1, min(n_threads, n // least))
 
 
-def in_shares(work: Callable[[slice], object], n: int, n_threads: int, least: int) -> None:
+def in_shares(
+    work: Callable[[slice], Shaped[np.ndarray, " m"]], n: int, n_threads: int, least: int
+) -> Shaped[np.ndarray, " n"]:
     """Does work on n particles, in equal shares at the same time.
 
     Args:
-        work: What to do with a share; it puts its results where only this share's belong.
+        work: From a share to its results, a number for each particle.
         n: How many there are.
         n_threads: Threads, this one included.
         least: Particles of a share below which another thread costs more than it saves.
+
+    Returns:
+        The results of all shares, one after the other.
     """
     k = n_shares(n, n_threads, least)
     if k == 1:
-        work(slice(0, n))
-        return
+        return work(slice(0, n))
     own, *others = (slice(n * i // k, n * (i + 1) // k) for i in range(k))
     running = [_pool(n_threads - 1, os.getpid()).submit(work, share) for share in others]
     try:
-        work(own)
+        first = work(own)
     finally:
-        for each in running:
-            each.result()
+        rest = [each.result() for each in running]
+    return np.concatenate([first, *rest])
 
 
 @lru_cache(maxsize=1)

@@ -13,6 +13,8 @@ KINDS = 256
 """Numbers that a byte can be."""
 OTHER = KINDS - 1
 """The number of all other colours in a block."""
+SHORT = 1 << 16
+"""Numbers that two bytes can be."""
 PLACES = 4
 """Codes in an integral image: OpenCV has a fast path for four channels, and one look-up serves them all."""
 
@@ -129,6 +131,11 @@ def _block(part: int, channel: int, codes: Integer[np.ndarray, " B"], n_codes: i
     table[bins] = np.arange(len(bins))
     start = int(codes[bins[0]])
     return Block(part, channel, slice(start, start + len(bins)), bins, table)
+
+
+def counting_type(most: int) -> type[np.uint16 | np.int32]:
+    """What holds counts up to `most`: two bytes if they can, whose roots need not be worked out."""
+    return np.uint16 if most < SHORT else np.int32
 
 
 @lru_cache

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Int, Integer
 
-from nodes.counting.codebook import OTHER, Block, Codebook, part_edges
+from nodes.counting.codebook import OTHER, Block, Codebook, counting_type, part_edges
 
 WORD_BITS = 64
 MANY_WORDS = 4
@@ -39,7 +39,7 @@ class GridSamples:
 
     def count(
         self, bins: Integer[np.ndarray, "C h w"]
-    ) -> tuple[Int[np.ndarray, "K N"], Int[np.ndarray, "P N"]]:
+    ) -> tuple[Integer[np.ndarray, "K N"], Int[np.ndarray, "P N"]]:
         """Counts the colours of the samples.
 
         Args:
@@ -58,7 +58,7 @@ class GridSamples:
         # Samples outside fall on a border one pixel wide, of a colour that nobody tells apart.
         bordered = [_bordered(channel, book.codes.shape[2]) for channel in bins]
         index = ((y * (width + 2))[:, None] + x).reshape(len(y) * n_columns, n_boxes)
-        counts = np.zeros((len(book.part), n_boxes), dtype=np.intp)
+        counts = np.zeros((len(book.part), n_boxes), counting_type(len(index)))
         for block in book.blocks:
             rows = self.parts[block.part]
             of_part = index[rows.start * n_columns : rows.stop * n_columns]
@@ -106,7 +106,7 @@ def _count_block(
     bins: Integer[np.ndarray, "h w"],
     index: Int[np.ndarray, "S N"],
     block: Block,
-    counts: Int[np.ndarray, "k N"],
+    counts: Integer[np.ndarray, "k N"],
 ) -> None:
     """Counts as many codes at once as fit into one machine word, each in bits of its own."""
     n_samples, n_boxes = index.shape

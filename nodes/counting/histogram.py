@@ -45,7 +45,7 @@ def count(
     boxes: Float[np.ndarray, "N 4"],
     book: Codebook,
     sampling: SamplingOptions,
-) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, "N P"]]:
+) -> tuple[Integer[np.ndarray, "N K"], Int[np.ndarray, "N P"]]:
     """Counts the colours in boxes.
 
     Args:

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from jaxtyping import Int, Int32, Integer, UInt8
+from jaxtyping import Int, Int32, Integer, UInt8, UInt64
 
 from nodes.counting.codebook import KINDS, PLACES, Block, Images
 
@@ -16,6 +16,8 @@ RARE, COMMON, LOW_BITS = 1, 128, 7
 """Marks of two codes in one place: a sum's lower bits count the rarer one, the others the commoner one.
 
 The upper 25 are enough for boxes of 33 million pixels."""
+WORD_BYTES = 8
+"""Codes that are counted in one word, a byte each."""
 JOINED_ROWS = 8
 """Rows of pixels that are compared at once: NumPy takes its time between one piece of memory and the next."""
 MOST_ADDED_UP = 255 // JOINED_ROWS * JOINED_ROWS
@@ -25,16 +27,19 @@ CHUNK_BYTES = 100_000
 
 
 def count_block(
-    bins: Integer[np.ndarray, "h w"], block: Block, corners: Int[np.ndarray, "4 N"]
-) -> Int32[np.ndarray, "k N"]:
+    bins: Integer[np.ndarray, "h w"], block: Block, corners: Int[np.ndarray, "4 N"], most: int
+) -> Integer[np.ndarray, "k N"]:
     """Counts the codes of one histogram.
 
     Args:
         bins: Of the pixels.
         block: The codes.
         corners: Where the boxes' corners lie in an integral image: I(t, l), I(t, r), I(b, l), I(b, r).
+        most: Pixels of the largest box.
     """
     numbers = block.numbers(bins)
+    if block.size <= WORD_BYTES and most < KINDS:
+        return _word_sums(numbers, _words(block), corners)[: block.size]
     if block.size <= 2 * PLACES:
         return _table_sums(numbers, _plain_tables(block), corners)[: block.size]
     # What does not occur here at all needs no place, and what does seldom shares one with what does often.
@@ -49,6 +54,32 @@ def count_block(
     counts[commoner] = sums[: len(commoner)].view(np.uint32) >> LOW_BITS
     counts[rarer] = sums[:n_rare] & (COMMON - 1)
     return counts
+
+
+@lru_cache(maxsize=64)
+def _words(block: Block) -> UInt64[np.ndarray, " B"]:
+    """From the number of a pixel to a word with a 1 in the byte of its code."""
+    marks = np.zeros((KINDS, WORD_BYTES), np.uint8)
+    marks[block.keys, np.arange(block.size)] = 1
+    return marks.view(np.uint64).ravel()
+
+
+def _word_sums(
+    numbers: UInt8[np.ndarray, "h w"], words: UInt64[np.ndarray, " B"], corners: Int[np.ndarray, "4 N"]
+) -> UInt8[np.ndarray, "8 N"]:
+    """Adds up the words in each box, of so few pixels that each of the sum's bytes is a count.
+
+    The integral image runs over, from byte to byte and at the top, and its rows go on where those above end:
+    the differences are right all the same, modulo 2^64.
+    """
+    height, width = numbers.shape
+    integral = np.zeros((height + 1, width + 1), np.uint64)
+    np.add.accumulate(words.take(numbers), axis=0, out=integral[1:, 1:])
+    entries = integral.ravel()
+    np.add.accumulate(entries, out=entries)
+    sums = entries.take(corners).reshape(2, 2, -1)
+    above = sums[:, 1] - sums[:, 0]
+    return (above[1] - above[0]).view(np.uint8).reshape(-1, WORD_BYTES).T
 
 
 @lru_cache(maxsize=64)
@@ -105,7 +136,8 @@ def count_channels(
         The counts of `images.codes`.
     """
     begin, end = inner
-    pixels = bins.transpose(1, 2, 0)
+    # as they lie in memory
+    pixels = bins[::-1].transpose(1, 2, 0)
     held = _fours(pixels[begin:end])
     outer = _fours(np.concatenate((pixels[: begin + 1], pixels[end:])) if end else pixels)
     shape = len(pixels) - max(end - begin - 1, 0), pixels.shape[1]
@@ -122,7 +154,7 @@ def _fours(pixels: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "n piece"]:
     n_pieces = -(-height // JOINED_ROWS)
     numbers = np.zeros((n_pieces * JOINED_ROWS, width, PLACES), np.uint8)
     if height:
-        cv2.cvtColor(pixels, cv2.COLOR_RGB2RGBA, numbers[:height])
+        cv2.cvtColor(pixels, cv2.COLOR_BGR2RGBA, numbers[:height])
     return numbers.reshape(n_pieces, JOINED_ROWS * width * PLACES)
 
 
@@ -167,12 +199,14 @@ def _box_sums(
     integral = np.empty((height + 1, width + 1, PLACES), np.int32)
     # four sums side by side are one entry of 16 bytes
     entries = integral.view(np.complex128).ravel()
-    found = np.empty((n_images, 4, n_boxes), np.complex128)
-    for of_image, at_corners in zip(marks, found, strict=True):
+    at_corners = np.empty((4, n_boxes), np.complex128)
+    left, right = at_corners.view(np.int32).reshape(2, 2, n_boxes * PLACES).swapaxes(0, 1)
+    above = np.empty((2, n_boxes * PLACES), np.int32)
+    sums = np.empty((n_images, n_boxes * PLACES), np.int32)
+    for of_image, sum_of_image in zip(marks, sums, strict=True):
         cv2.integral(of_image, integral)
         entries.take(corners, mode="clip", out=at_corners)
-    # what lies between a box's sides above its bottom, less what does above its top
-    sums = found.view(np.int32).reshape(n_images, 2, 2, n_boxes * PLACES)
-    above = sums[:, :, 1] - sums[:, :, 0]
-    total = above[:, 1] - above[:, 0]
-    return total.reshape(n_images, n_boxes, PLACES).swapaxes(1, 2)
+        # what lies between a box's sides above its bottom, less what does above its top
+        np.subtract(right, left, out=above)
+        np.subtract(above[1], above[0], out=sum_of_image)
+    return sums.reshape(n_images, n_boxes, PLACES).swapaxes(1, 2)

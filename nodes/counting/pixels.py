@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int, Integer
 
-from nodes.counting.codebook import Codebook
+from nodes.counting.codebook import Codebook, counting_type
 from nodes.counting.integrals import count_block, count_channels, inner_rows
 
 BOX_COST, PIXEL_COST = 30_000, 10
@@ -50,7 +50,7 @@ class PixelBoxes:
 
     def count(
         self, bins: Integer[np.ndarray, "C h w"]
-    ) -> tuple[Int[np.ndarray, "K N"], Int[np.ndarray, "P N"]]:
+    ) -> tuple[Integer[np.ndarray, "K N"], Int[np.ndarray, "P N"]]:
         """Counts the colours of their pixels.
 
         Args:
@@ -66,15 +66,15 @@ class PixelBoxes:
         if left_for_pixels > 0 and n_channels * PIXEL_COST * int(pixels.sum()) < left_for_pixels:
             return self._one_by_one(bins), pixels
         # one row more, for places that no code has
-        counts = np.zeros((n_codes + 1, sides.shape[1]), np.int32)
+        counts = np.zeros((n_codes + 1, sides.shape[1]), counting_type(height * width))
         for part, rows in enumerate(self.rows):
             if rows.first >= rows.last or not pixels.size:
                 continue
             of_part = bins[:, rows.first - self.region[1] : rows.last - self.region[1]]
             if n_channels == 1:
-                corners = self._corners(part, rows, width)
+                corners, most = self._corners(part, rows, width), int(np.maximum.reduce(pixels[part]))
                 for block in self.book.blocks_of[part]:
-                    counts[block.codes] = count_block(of_part[0], block, corners)
+                    counts[block.codes] = count_block(of_part[0], block, corners, most)
             else:
                 images = self.book.images[part]
                 inner = inner_rows(rows.held_from - rows.first, rows.held_to - rows.first)
@@ -118,20 +118,25 @@ def pixel_boxes(boxes: Float[np.ndarray, "N 4"], size_px: tuple[int, int], book:
         size_px: Width and height of the picture.
         book: The colours that are told apart.
     """
-    # A pixel belongs to a box that holds its centre; NaN becomes an empty box.
+    # A pixel belongs to a box that holds its centre.
     width, height = size_px
-    cells = _whole_pixels(np.add(boxes.T, 0.5, order="C"), _limits(size_px))
+    edges = np.add(boxes.T, 0.5, order="C")
+    left, top, held_to, held_from, right, bottom = _extremes(edges, max(size_px))
+    if not (left >= 0 and top >= 0 and right <= width and bottom <= height):  # also where one is NaN
+        _clip(edges, _limits(size_px))
+        left, top, held_to, held_from, right, bottom = _extremes(edges, max(size_px))
+    # the floor of what is not negative
+    cells = edges.astype(np.intp)
     sides, bounds = cells[::2], cells[1::2]
-    left, top, _, held_to = np.minimum.reduce(cells, axis=1, initial=max(size_px)).tolist()
-    _, held_from, right, bottom = np.maximum.reduce(cells, axis=1, initial=0).tolist()
     # at least one pixel
-    left, top = min(left, width - 1), min(top, height - 1)
-    region = left, top, max(right, left + 1), max(bottom, top + 1)
-    rows: tuple[Rows, ...] = (Rows(top, held_from, held_to, region[3]),)
+    left, top = min(int(left), width - 1), min(int(top), height - 1)
+    region = left, top, max(int(right), left + 1), max(int(bottom), top + 1)
+    rows: tuple[Rows, ...] = (Rows(top, int(held_from), int(held_to), region[3]),)
     if len(book.part_heights) > 1:
         tops, bottoms = boxes.T[1::2]
-        between = _whole_pixels(tops + book.part_edges[1:-1, None] * (bottoms - tops) + 0.5, height)
-        bounds = np.concatenate([bounds[:1], between, bounds[1:]])
+        between = tops + book.part_edges[1:-1, None] * (bottoms - tops) + 0.5
+        _clip(between, height)
+        bounds = np.concatenate([bounds[:1], between.astype(np.intp), bounds[1:]])
         low = np.minimum.reduce(bounds, axis=1, initial=height).tolist()
         high = np.maximum.reduce(bounds, axis=1, initial=0).tolist()
         rows = tuple(map(Rows, low, high, low[1:], high[1:]))
@@ -143,11 +148,14 @@ def _limits(size_px: tuple[int, int]) -> Float[np.ndarray, "4 1"]:
     return np.array([*size_px, *size_px], float)[:, None]
 
 
-def _whole_pixels(
-    edges: Float[np.ndarray, "E N"], sizes: int | Float[np.ndarray, "E 1"]
-) -> Int[np.ndarray, "E N"]:
-    """Whole pixels within the picture, 0 for NaN; writes into its argument."""
+def _extremes(edges: Float[np.ndarray, "4 N"], most: int) -> tuple[float, ...]:
+    """Least left, top and bottom, and greatest top, right and bottom; NaN where one is."""
+    left, top, _, held_to = np.minimum.reduce(edges, axis=1, initial=most).tolist()
+    _, held_from, right, bottom = np.maximum.reduce(edges, axis=1, initial=0).tolist()
+    return left, top, held_to, held_from, right, bottom
+
+
+def _clip(edges: Float[np.ndarray, "E N"], sizes: int | Float[np.ndarray, "E 1"]) -> None:
+    """Brings edges into the picture, NaN to 0."""
     np.fmax(edges, 0, out=edges)
     np.minimum(edges, sizes, out=edges)
-    # the floor of what is not negative
-    return edges.astype(np.intp)

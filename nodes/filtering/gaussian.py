@@ -35,13 +35,11 @@ class Information:
 
 def moments(states: Float[np.ndarray, "N D"], weights: Float[np.ndarray, " N"]) -> Moments:
     """Weighted mean and covariance of a sample (Eq. 9-10 and 13-14)."""
-    # One row a component: NumPy is quick along the long axis only.
-    components = np.array(states.T, order="C")
     # u = Σ ωⱼ χⱼ
-    mean = components @ weights
-    # p = Σ ωⱼ (χⱼ - u)(χⱼ - u)ᵀ, centred before the product
-    components -= mean[:, None]
-    covariance = (components * weights) @ components.T
+    mean = states.T @ weights
+    # p = Σ ωⱼ (χⱼ - u)(χⱼ - u)ᵀ, one row a component: NumPy is quick along the long axis only
+    centred = np.subtract(states.T, mean[:, None], order="C")
+    covariance = (centred * weights) @ centred.T
     return Moments(mean, (covariance + covariance.T) / 2)
 
 

@@ -56,9 +56,9 @@ class MotionModel:
         return len(self.variances) // 2
 
     @cached_property
-    def deviations(self) -> Float[np.ndarray, "D D"]:
-        """The root of Q, standard deviations on its diagonal: in a product, quicker than four to a row."""
-        return np.diag(np.sqrt(self.variances))
+    def deviations(self) -> Float[np.ndarray, "D M"]:
+        """G, the root of Q without its columns of zeros: from M independent normals to ξ."""
+        return np.diag(np.sqrt(self.variances))[:, self.variances > 0]
 
 
 def constant_velocity(n_axes: int, interval: float, options: DynamicsOptions) -> MotionModel:
@@ -97,14 +97,15 @@ def motion_model(n_axes: int, interval: float, options: DynamicsOptions) -> Moti
 
 def transition(states: Float[np.ndarray, "N D"], model: MotionModel) -> Float[np.ndarray, "N D"]:
     """F x of every particle, without noise."""
-    return states @ model.F.T
+    # One row a component: NumPy is quick along the long axis only.
+    return (model.F @ states.T).T
 
 
 def predict(
     states: Float[np.ndarray, "N D"], model: MotionModel, rng: np.random.Generator
 ) -> Float[np.ndarray, "N D"]:
     """Draws from the prior P(x(k) | x(k-1)), the proposal of the SIR filter."""
-    # x(k) = F x(k-1) + ξ(k)
-    moved = rng.standard_normal(states.shape) @ model.deviations
-    moved += transition(states, model)
-    return moved
+    # x(k) = F x(k-1) + ξ(k), ξ = G n: nothing is drawn for what only remembers
+    G = model.deviations
+    noise = G @ rng.standard_normal((G.shape[1], len(states)))
+    return transition(states, model) + noise.T

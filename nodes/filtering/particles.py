@@ -4,8 +4,10 @@ Source: Arulampalam et al., "A tutorial on particle filters" (2002), Algorithms 
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -14,6 +16,20 @@ from nodes.threads import in_shares
 
 LEAST_OUTPUTS = 75_000
 """New particles that a thread draws at least; for fewer it is hardly worth its start."""
+
+T = TypeVar("T")
+
+
+class lazy(Generic[T]):  # noqa: N801 - as the property that it is
+    """`functools.cached_property` without the lock of Python 3.11, which takes longer than what it guards."""
+
+    def __init__(self, compute: Callable[[Any], T]) -> None:
+        self._compute = compute
+
+    def __get__(self, instance: object, owner: type) -> T:
+        # from now on the instance's own attribute is found first
+        value = instance.__dict__[self._compute.__name__] = self._compute(instance)
+        return value
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +49,12 @@ class Particles:
         """The position part of the states."""
         return self.states[:, : self.states.shape[1] // 2]
 
-    @cached_property
+    @lazy
     def weights(self) -> Float[np.ndarray, " N"]:
         """The weights themselves."""
         return np.exp(self.log_weights)
 
-    @cached_property
+    @lazy
     def effective_sample_size(self) -> float:
         """1 / Σ ω²: how many equally weighted particles the sample is worth."""
         return float(1 / (self.weights @ self.weights))
@@ -83,11 +99,11 @@ def normalize(log_weights: Float[np.ndarray, " N"]) -> tuple[Float[np.ndarray, "
         The normalised log weights and the log of the sum that was divided out (the log evidence of a
         reweighting). Where every weight is zero, nothing was learnt: uniform weights and -inf.
     """
-    peak = log_weights.max()
+    peak = float(np.maximum.reduce(log_weights))
     if not math.isfinite(peak):
         return uniform_log_weights(len(log_weights)), -np.inf
-    log_sum = peak + np.log(np.exp(log_weights - peak).sum())
-    return log_weights - log_sum, float(log_sum)
+    log_sum = peak + math.log(np.add.reduce(np.exp(log_weights - peak)))
+    return log_weights - log_sum, log_sum
 
 
 def reweight(particles: Particles, log_factors: Float[np.ndarray, " N"]) -> Particles:
@@ -134,10 +150,15 @@ def _ancestors(
     upper_edges: Float[np.ndarray, " K"], outputs: slice, n: int, offset: float
 ) -> Int[np.ndarray, " M"]:
     """Each output finds its own ancestor by itself (Truong & Kim, Algorithm 1)."""
-    draws = np.arange(outputs.start, outputs.stop, dtype=float)
-    draws += offset
-    draws /= n
-    return upper_edges.searchsorted(draws, side="right")
+    return upper_edges.searchsorted(_strata(n)[outputs] + offset / n, side="right")
+
+
+@lru_cache(maxsize=8)
+def _strata(n: int) -> Float[np.ndarray, " N"]:
+    """Where each of n equal parts of the line from 0 to 1 begins; not to be written to."""
+    begins = np.arange(n) / n
+    begins.setflags(write=False)
+    return begins
 
 
 def resample_if_degenerate(
@@ -162,12 +183,7 @@ def resample(
         least: How many new particles a thread draws at least.
     """
     n, upper_edges = len(particles.log_weights), _upper_edges(particles.weights)
-    states = np.empty_like(particles.states, order="C")
-
-    def draw(outputs: slice) -> None:
-        ancestors = _ancestors(upper_edges, outputs, n, offset)
-        # the ancestors are particles: nothing is clipped, but checked in another way, with a copy
-        particles.states.take(ancestors, axis=0, out=states[outputs], mode="clip")
-
-    in_shares(draw, n, n_threads, least)
-    return Particles(states, uniform_log_weights(n))
+    ancestors = in_shares(lambda outputs: _ancestors(upper_edges, outputs, n, offset), n, n_threads, least)
+    # the ancestors are particles: nothing is clipped, but checked in another way, with a copy
+    components = particles.states.T.take(ancestors, axis=1, mode="clip")
+    return Particles(components.T, uniform_log_weights(n))

@@ -81,5 +81,5 @@ def sum_log_likelihoods(
     """Adds up log Π P(z | χ) over the cameras, which see independently of each other."""
     if not views:
         return np.zeros(len(positions))
-    each = (view.model.log_likelihoods(view.picture, positions, view.appearance) for view in views)
+    each = [view.model.log_likelihoods(view.picture, positions, view.appearance) for view in views]
     return reduce(add, each)

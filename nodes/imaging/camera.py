@@ -5,10 +5,13 @@ K distort(x/z), with pixel (0, 0) at the centre of the top left pixel.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Float
+
+MIN_DEPTH = 1e-6
+"""Depth along the optical axis from which a point is before the camera, in m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +54,14 @@ class Camera:
         return float(real[real > 0].min(initial=np.inf))
 
     @cached_property
-    def _focal_lengths(self) -> Float[np.ndarray, "2 1"]:
-        return self.K.diagonal()[:2, None]
-
-    @cached_property
     def _distorts(self) -> bool:
         return bool(self.distortion.any())
+
+    @cached_property
+    def projection(self) -> Float[np.ndarray, "3 4"]:
+        """K [R | t], from the world to pixels times depth; [R | t] where the lens bends rays before K."""
+        extrinsics = np.column_stack([self.R, self.t])
+        return extrinsics if self._distorts else self.K @ extrinsics
 
     def project(
         self, points: Float[np.ndarray, "N 3"]
@@ -70,36 +75,73 @@ class Camera:
             Pixel coordinates, NaN for points that no lens of this kind can picture (behind the camera, or
             beyond the radius where the distortion folds), and depths along the optical axis in metres.
         """
-        seen = self.R @ points.T
-        seen += self.t[:, None]
-        depth = seen[2]
-        pictured = depth > 1e-6
-        x, y = rays = seen[:2] / np.maximum(depth, 1e-6)
-        if self._distorts:
-            k1, k2, p1, p2, k3 = self.distortion
-            r2 = x * x + y * y
-            pictured &= r2 < self._radius2_limit
-            radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-            x, y = rays = np.stack(
-                (
-                    x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
-                    y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
-                )
-            )
-        # u = f_x x + s y + c_x, v = f_y y + c_y
-        pixels = rays * self._focal_lengths
-        if self.K[0, 1]:
-            pixels[0] += self.K[0, 1] * y
-        pixels += self.K[:2, 2:]
-        if not pictured.all():
-            np.copyto(pixels, np.nan, where=~pictured)
+        pixels, depth = self._picture(self.projection[:, :3] @ points.T + self.projection[:, 3:])
         return pixels.T, depth
+
+    def project_uprights(
+        self, positions: Float[np.ndarray, "N A"], low: float, high: float
+    ) -> tuple[Float[np.ndarray, "2 2 N"], Float[np.ndarray, " N"]]:
+        """Projects both ends of upright lines, as `project` would.
+
+        Args:
+            positions: Places of the lines, (x, y) or (x, y, z) in metres.
+            low: Height of the lower end above each place, or above the floor.
+            high: Height of the upper end.
+
+        Returns:
+            Pixel coordinates, x and y of the lower ends and of the upper ones, and the middles' depths, those
+            behind the camera brought before it.
+        """
+        matrix, offset = _uprights(self, positions.shape[1], low, high)
+        seen = matrix @ positions.T
+        seen += offset
+        pixels, _ = self._picture(seen[:6].reshape(3, 2, -1))
+        return pixels, np.maximum(seen[6], MIN_DEPTH)
+
+    def _picture(
+        self, seen: Float[np.ndarray, "3 ..."]
+    ) -> tuple[Float[np.ndarray, "2 ..."], Float[np.ndarray, "..."]]:
+        """Pixels and depths of what `projection` makes of points."""
+        depth = seen[2]
+        if np.minimum.reduce(depth, axis=None, initial=np.inf) > MIN_DEPTH:
+            pixels = seen[:2] / depth
+        else:  # also where one is NaN
+            pixels = seen[:2] / np.where(depth > MIN_DEPTH, depth, np.nan)
+        return (self._distorted(pixels) if self._distorts else pixels), depth
+
+    def _distorted(self, rays: Float[np.ndarray, "2 ..."]) -> Float[np.ndarray, "2 ..."]:
+        """From rays x/z, y/z to pixels."""
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = rays
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        x, y = (
+            x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+            y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+        )
+        # u = f_x x + s y + c_x, v = f_y y + c_y
+        (f_x, s, c_x), (_, f_y, c_y), _ = self.K.tolist()
+        pixels = np.stack((f_x * x + s * y + c_x, f_y * y + c_y))
+        return np.where(r2 < self._radius2_limit, pixels, np.nan)
 
     def contains(self, pixels: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, " N"]:
         """Which pixel coordinates lie inside the picture."""
         u, v = pixels.T
         with np.errstate(invalid="ignore"):
             return (u >= -0.5) & (u < self.width_px - 0.5) & (v >= -0.5) & (v < self.height_px - 0.5)
+
+
+@lru_cache
+def _uprights(
+    camera: Camera, n_axes: int, low: float, high: float
+) -> tuple[Float[np.ndarray, "7 A"], Float[np.ndarray, "7 1"]]:
+    """What `projection` makes of both ends of upright lines: x, y and z of each, and z of their middles.
+
+    P [x y z + h 1] = P [x y z 0] + (p₄ + h p₃), and x and y alone are a place on the floor.
+    """
+    rows = camera.projection[[0, 0, 1, 1, 2, 2, 2]]
+    heights = np.array([low, high] * 3 + [(low + high) / 2])
+    return rows[:, :n_axes], (rows[:, 3] + heights * rows[:, 2])[:, None]
 
 
 def look_at(

@@ -6,7 +6,7 @@ Sources: Jing & Chen, Eq. 4 (update) and 11 (normalisation).
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Integer
 from pydantic import Field
 
 from network.options import Options
@@ -54,7 +54,7 @@ class Appearance:
 
 
 def normalize_counts(
-    counts: Int[np.ndarray, "N K"], pixels: Int[np.ndarray, "N P"], options: ColorOptions
+    counts: Integer[np.ndarray, "N K"], pixels: Int[np.ndarray, "N P"], options: ColorOptions
 ) -> Float[np.ndarray, "N P C B"]:
     """Takes hist / sum(hist) of each part and channel (Eq. 11), from counts of every bin."""
     shape = (len(counts), len(options.parts), options.n_channels, options.n_bins)

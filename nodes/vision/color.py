@@ -129,17 +129,15 @@ def quantize(
         bits = n.bit_length() - 1
         if options.space == "joint_rgb":
             return _joint_bits(image, bits)[None]
-        rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
-        np.right_shift(rgb, 8 - bits, out=rgb)
+        values = np.right_shift(image, 8 - bits)
     else:
         tables = _tables(options, gain).astype(np.uint8 if options.n_bins <= 256 else np.uint16)
         values = cv2.LUT(image, np.ascontiguousarray(tables.T)[None])
         if options.space == "joint_rgb":
             blue, green, red = cv2.split(values)
             return (red + green + blue)[None]
-        rgb = cv2.cvtColor(values, cv2.COLOR_BGR2RGB)
-    # side by side in memory, as counting wants them
-    return rgb.transpose(2, 0, 1)
+    # a view of what lies side by side in memory, blue first, as counting wants it
+    return values[..., ::-1].transpose(2, 0, 1)
 
 
 def _joint_bits(image: UInt8[np.ndarray, "H W 3"], bits: int) -> Integer[np.ndarray, "H W"]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Int, Integer, UInt8
 from pydantic import Field
 
 from network.options import Options
@@ -41,7 +41,7 @@ from nodes.vision.likelihood import (
     log_gaussian,
     with_miss_floor,
 )
-from nodes.vision.pattern import Pattern, coefficients, full_codebook, pattern_of, squared_distances
+from nodes.vision.pattern import Pattern, full_codebook, pattern_of, squared_distances
 from nodes.vision.standstill import Background, background_of, likeness
 from nodes.vision.target import TargetOptions, project_boxes, visible_fraction
 
@@ -158,7 +158,7 @@ class ObservationModel:
         visible = visible_fraction(boxes, self.camera)
         pattern = pattern_of(appearance, self.options.color, all_bins=True)
         counts, pixels = self._count(picture, boxes, pattern.book)
-        distance = squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
+        distance = squared_distances(counts, pixels, pattern)
         histograms = normalize_counts(counts, pixels, self.options.color)[0]
         return Sight(histograms, float(distance[0]), float(visible[0]))
 
@@ -218,13 +218,10 @@ class ObservationModel:
             return self._on_array(picture, boxes, pattern, self.processor)
         if self.options.threads == 1:
             return self._share_distances(picture, boxes, pattern)
-        distances = np.empty(len(boxes))
-
-        def measure(share: slice) -> None:
-            distances[share] = self._share_distances(picture, boxes[share], pattern)
-
-        in_shares(measure, len(boxes), self.options.threads, LEAST_BOXES)
-        return distances
+        return in_shares(
+            lambda share: self._share_distances(picture, boxes[share], pattern),
+            *(len(boxes), self.options.threads, LEAST_BOXES),
+        )
 
     def _share_distances(
         self, picture: Picture, boxes: Float[np.ndarray, "N 4"], pattern: Pattern
@@ -236,7 +233,7 @@ class ObservationModel:
                 image = without_gain(image, picture.gain)
             return distances_compiled(image, code, boxes, pattern.compiled, sampling.grid, sampling.kernel)
         counts, pixels = self._count(picture, boxes, pattern.book)
-        return squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
+        return squared_distances(counts, pixels, pattern)
 
     def _on_array(
         self,
@@ -259,7 +256,7 @@ class ObservationModel:
 
     def _count(
         self, picture: Picture, boxes: Float[np.ndarray, "N 4"], book: Codebook
-    ) -> tuple[Int[np.ndarray, "N K"], Int[np.ndarray, "N P"]]:
+    ) -> tuple[Integer[np.ndarray, "N K"], Int[np.ndarray, "N P"]]:
         # Only the region that the boxes cover is quantised.
         size_px = self.camera.width_px, self.camera.height_px
         where = locate(boxes, size_px, book, self.options.sampling)

@@ -12,7 +12,8 @@ from nodes.imaging.camera import Camera
 
 MIN_ASPECT = 0.8
 """Least height of a box in widths: what is left of a person seen from straight above."""
-_TRUNK_ASPECT = np.array([[1.0], [MIN_ASPECT]])
+MIN_HEIGHT_PX = 2.0
+"""Height below which a box shows nothing."""
 
 
 class StartOptions(Options):
@@ -108,41 +109,48 @@ def project_boxes(
         pictured from there, or would be less than two pixels high.
     """
     # One row a coordinate, and the boxes' sides likewise: NumPy is quick along the long axis only.
-    n, n_axes = positions.shape
-    boxes = np.empty((4, n))
+    n = len(positions)
+    sides = np.empty((2, 2, n))
     if target.size_px is not None:
-        width, height = target.size_px
-        middle, half = np.add(positions.T, 0.5, order="C"), _column(width / 2, height / 2)
-        np.subtract(middle, half, out=boxes[:2])
-        np.add(middle, half, out=boxes[2:])
-        return boxes.T
-    body = np.empty((3, 2, n))
-    body[:n_axes] = positions.T[:, None]
-    foot, head = body[2]
-    if target.space == "plane":
-        foot[:] = target.plane_height
-    else:
-        foot -= target.height / 2
-    np.add(foot, target.height, out=head)
-    pixels, depths = camera.project(body.reshape(3, 2 * n).T)
-    low, high = pixels.T[:, :n], pixels.T[:, n:]
-    middle = low + high
-    middle /= 2
-    middle += 0.5
+        np.add(positions.T, _sides(*target.size_px), out=sides)
+        return sides.reshape(4, n).T
+    low = target.plane_height if target.space == "plane" else -target.height / 2
+    ends, depth = camera.project_uprights(positions, low, low + target.height)
     # A slanted or rolled view shortens the body but not its thickness: a box is at least as wide as it,
     # and nearly as high.
-    distance = np.maximum((depths[:n] + depths[n:]) / 2, 1e-6)
-    half = low - high
-    np.abs(half, out=half)
-    half *= 0.5
-    trunk = float(0.5 * camera.K[0, 0] * target.width) / distance
-    np.maximum(half, trunk * _TRUNK_ASPECT, out=half)
-    np.subtract(middle, half, out=boxes[:2])
-    np.add(middle, half, out=boxes[2:])
-    pictured = half[1] > 1.0
-    if not pictured.all():
-        np.copyto(boxes, np.nan, where=~pictured)
+    size = ends[:, 0] - ends[:, 1]
+    np.abs(size, out=size)
+    np.maximum(size, _trunk_px(target.width, camera) / depth, out=size)
+    twice_middle = ends[:, 0] + ends[:, 1]
+    twice_middle += 1
+    np.subtract(twice_middle, size, out=sides[0])
+    np.add(twice_middle, size, out=sides[1])
+    sides *= 0.5
+    boxes = sides.reshape(4, n)
+    if not np.minimum.reduce(size[1], initial=np.inf) > MIN_HEIGHT_PX:  # also where one is NaN
+        boxes[:, ~(size[1] > MIN_HEIGHT_PX)] = np.nan
     return boxes.T
+
+
+@lru_cache
+def _sides(width: float, height: float) -> Float[np.ndarray, "2 2 1"]:
+    """From the middle of a pixel to the sides of a box around it: left and top, right and bottom."""
+    half = _column(width / 2, height / 2)
+    return np.stack([0.5 - half, 0.5 + half])
+
+
+@lru_cache(maxsize=8)  # what most frames ask for
+def _wholly(n: int) -> Float[np.ndarray, " N"]:
+    """That each of n boxes is in the picture; not to be written to."""
+    ones = np.ones(n)
+    ones.setflags(write=False)
+    return ones
+
+
+@lru_cache
+def _trunk_px(width: float, camera: Camera) -> Float[np.ndarray, "2 1"]:
+    """Least width and height of a box, in px at a depth of 1 m."""
+    return camera.K[0, 0] * _column(width, MIN_ASPECT * width)
 
 
 @lru_cache
@@ -151,8 +159,13 @@ def _column(x: float, y: float) -> Float[np.ndarray, "2 1"]:
 
 
 def visible_fraction(boxes: Float[np.ndarray, "N 4"], camera: Camera) -> Float[np.ndarray, " N"]:
-    """The part of each box that lies inside the picture, 0 to 1."""
+    """The part of each box that lies inside the picture, 0 to 1; boxes have an area, or are NaN."""
     low, high = boxes.T[:2], boxes.T[2:]
+    # mostly all of all of them
+    right, bottom = np.maximum.reduce(high, axis=1, initial=0.0).tolist()
+    within = right <= camera.width_px and bottom <= camera.height_px
+    if within and np.minimum.reduce(low, axis=None, initial=0.0) >= 0:
+        return _wholly(len(boxes))
     inside = np.minimum(high, _column(float(camera.width_px), float(camera.height_px)))
     inside -= np.maximum(low, 0.0)
     np.maximum(inside, 0.0, out=inside)

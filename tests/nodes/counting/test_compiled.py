@@ -13,7 +13,7 @@ from nodes.counting.codebook import codebook
 from nodes.counting.compiled import compile_reference, counts_compiled, distances_compiled
 from nodes.counting.histogram import SamplingOptions, count
 from nodes.vision.color import ColorOptions, coding, quantize
-from nodes.vision.pattern import Pattern, coefficients, squared_distances
+from nodes.vision.pattern import Pattern, squared_distances
 
 HEIGHT, WIDTH = 30, 40
 BOX_COSTS = [10**9, -(10**9)]
@@ -84,7 +84,7 @@ def test_counts_are_equal_to_the_last_one(seed, boxes, colors, parts, grid, shar
     pattern = Pattern(
         book, scale, tuple(np.searchsorted(book.part, np.arange(len(parts) + 1)).tolist()), perfect
     )
-    distances = squared_distances(coefficients(counts, found, pattern), found, pattern)
+    distances = squared_distances(counts, found, pattern)
     np.testing.assert_allclose(distances_compiled(*asked), distances, atol=1e-12)
 
 

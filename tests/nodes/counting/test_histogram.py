@@ -83,6 +83,21 @@ def test_rare_colours_and_rows_that_all_boxes_hold_are_counted_like_any(n_channe
                 assert in_box[part] == n_pixels
 
 
+@pytest.mark.parametrize("size", [(15, 17), (16, 16)])  # 255 pixels, and one more than a byte holds
+@pytest.mark.parametrize("n_codes", [8, 9])
+def test_the_smallest_boxes_are_counted_like_any(size, n_codes):
+    rng = np.random.default_rng(5)
+    # halves of one colour each, so that boxes hold nothing else, and noise between them
+    bins = np.repeat([0, n_codes - 1], 100)[None, None].repeat(60, axis=1).astype(np.uint8)
+    bins[:, :, 90:110] = rng.integers(0, n_codes, (60, 20))
+    left_top = rng.uniform([0, 0], [200, 60] - np.array(size), (50, 2))
+    boxes = np.hstack([left_top, left_top + size])
+    counts, pixels = count(bins, boxes, full_book(1, n_codes, (1.0,)), EVERY_PIXEL)
+    np.testing.assert_array_equal(pixels, size[0] * size[1])
+    for box, of_box in zip(boxes, counts, strict=True):
+        np.testing.assert_array_equal(of_box, by_opencv(bins[0], box, 0.0, 1.0, n_codes)[0])
+
+
 def by_loop(bins, box, book, sampling):
     """One sample after the other."""
     counts, pixels = np.zeros(len(book.part), int), np.zeros(len(book.part_heights), int)

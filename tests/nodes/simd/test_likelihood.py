@@ -8,7 +8,7 @@ from nodes.simd.likelihood import SimdLikelihood
 from nodes.simd.options import SimdOptions
 from nodes.vision.appearance import Appearance
 from nodes.vision.color import ColorOptions
-from nodes.vision.pattern import coefficients, pattern_of, squared_distances
+from nodes.vision.pattern import pattern_of, squared_distances
 
 HEIGHT, WIDTH = 48, 64
 PARTS = {"parts": (0.2, 0.45, 0.35), "part_weights": (0.2, 0.5, 0.3)}
@@ -45,7 +45,7 @@ def measured(color, seed, sampling=None, *, batching=True, **simd):
     measurement = processor.measure(bins, boxes, pattern, (WIDTH, HEIGHT))
     report = processor.report
     counts, pixels = count(bins, boxes, pattern.book, sampling)
-    distance = squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
+    distance = squared_distances(counts, pixels, pattern)
     return measurement, report, counts, pixels, distance
 
 

@@ -20,7 +20,7 @@ from nodes.vision.appearance import (
     update_appearance,
 )
 from nodes.vision.color import ColorOptions
-from nodes.vision.pattern import coefficients, pattern_of, squared_distances
+from nodes.vision.pattern import pattern_of, squared_distances
 
 JOINT = ColorOptions(space="joint_rgb", bins_per_channel=2)
 RGB = ColorOptions(bins_per_channel=4)
@@ -51,7 +51,7 @@ def distances(counts, reference, options, n_pixels=50, distinctness=1.0):
 
 def distances_of(counts, pixels, appearance, options):
     pattern = pattern_of(appearance, options)
-    return squared_distances(coefficients(counts, pixels, pattern), pixels, pattern)
+    return squared_distances(counts, pixels, pattern)
 
 
 @given(seeds)
