@@ -55,9 +55,18 @@ def with_miss_floor(
         variance: σ².
         min_visible: Below this part inside the picture the camera has nothing to say.
     """
-    # ℓ = log(exp(-d²/2σ²) + exp(-d₀²/2σ²)), and the second alone where the box is hardly visible
+    # ℓ = log(exp(-d²/2σ²) + exp(-d₀²/2σ²)), the larger one taken out, which no exponential exceeds
     floor = -miss_distance / (2 * variance)
-    return np.where(visible < min_visible, floor, np.logaddexp(log_match, floor))
+    larger, ratio = np.maximum(log_match, floor), np.minimum(log_match, floor)
+    ratio -= larger
+    np.exp(ratio, out=ratio)
+    ratio += 1
+    larger += np.log(ratio, out=ratio)
+    # and the second alone where the box is hardly visible
+    hidden = visible < min_visible
+    if hidden.any():
+        larger[hidden] = floor
+    return larger
 
 
 def background_constants(
