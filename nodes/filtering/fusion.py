@@ -36,9 +36,9 @@ class FusionOptions(Options):
 
     rule: RuleName = "quadratic_fit"
     """`eq17`: the ratio N(u, p)/N(v, r) as printed; `net_information`: its part that is a density, on the
-    position; `quadratic_fit`: the same, read off the log-likelihood by a concave quadratic that is fitted to it
-    over the particles. To compare with: `naive`, the mean of the estimates; `covariance_intersection`; `hybrid` consensus on measurements
-    and information; `icf`, the information-weighted consensus filter."""
+    position; `quadratic_fit`: the same, read off the log-likelihood by a concave quadratic that is fitted to
+    it over the particles. To compare with: `naive`, the mean of the estimates; `covariance_intersection`;
+    `hybrid` consensus on measurements and information; `icf`, the information-weighted consensus filter."""
     local_particles: Literal["own", "shared"] = "shared"
     """`own`: the local filter keeps particles of its own, as the text has it; `shared`: it weights the fusion
     filter's, as Algorithm 1 has it, so that a blind camera contributes exactly nothing."""

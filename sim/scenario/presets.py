@@ -43,7 +43,7 @@ ROBUST: Mapping[str, Any] = {
     },
     "fusion": {"rule": "quadratic_fit", "local_particles": "shared", "proposal": "optimal"},
 }
-"""Joint colours without the camera's gain, a likelihood set from the background, and its quadratic fit exchanged."""
+"""Joint colours without the camera's gain, a likelihood set from the background, whose fit is exchanged."""
 
 ONE_CAMERA: Mapping[str, Any] = {
     "target": {"start": {"position_error": 1.0, "position_deviation": 2.0, "velocity_deviation": 30.0}},
