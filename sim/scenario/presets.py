@@ -57,6 +57,9 @@ ONE_CAMERA_PAPER: Mapping[str, Any] = {
 """Medeiros et al. and Truong & Kim: a Gaussian in the distance, whatever the camera sees, and resampling in
 every frame."""
 
+ONE_CAMERA_ROBUST: Mapping[str, Any] = {"fusion": {"rule": "net_information"}}
+"""A camera that nobody helps stays nearer to its particles by their moments than by a quadratic."""
+
 LOSSY: Mapping[str, Any] = {"network": {"consensus": {"algorithm": "ratio"}}}
 """What the robust preset averages with where links lose messages."""
 
@@ -84,8 +87,7 @@ def preset_defaults(data: Mapping[str, Any]) -> Mapping[str, Any]:
     defaults = PAPER if name == "paper" else ROBUST
     if isinstance(target, Mapping) and target.get("space") == "image":
         defaults = _merged(defaults, ONE_CAMERA)
-        if name == "paper":
-            defaults = _merged(defaults, ONE_CAMERA_PAPER)
+        defaults = _merged(defaults, ONE_CAMERA_PAPER if name == "paper" else ONE_CAMERA_ROBUST)
     elif name == "robust" and _is_person(target):
         defaults = _merged(defaults, PERSON_PARTS)
     network = data.get("network")

@@ -71,6 +71,7 @@ def test_in_the_image_plane_both_presets_begin_with_pixels_and_a_person_is_one_p
     assert filled["target"] == ONE_CAMERA["target"]
     assert filled["filter"]["dynamics"] == ONE_CAMERA["filter"]["dynamics"]
     assert filled["filter"]["color"].get("parts", [1.0]) == [1.0]
+    assert filled["fusion"]["rule"] == {"paper": "eq17", "robust": "net_information"}[preset]
     # the papers' trackers: a Gaussian in the distance, resampling in every frame
     literal = filled["filter"]["likelihood"].get("form") == "literal"
     assert literal == (filled["filter"].get("resampling") == {"threshold": 1.0}) == (preset == "paper")

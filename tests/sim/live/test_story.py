@@ -64,8 +64,11 @@ def test_boxes_are_in_the_pictures_of_those_that_they_concern(assembly):
             projected = project_boxes(message.mean[None, :2], target, assembly.cameras[name])[0]
             np.testing.assert_allclose(box, projected, atol=0.051)
         rim = np.array(event["ellipse"]) - message.mean[:2]
-        far = np.einsum("ij,jk,ik->i", rim, np.linalg.inv(message.covariance[:2, :2]), rim)
-        np.testing.assert_allclose(far, 4, rtol=0.2)  # to the millimetre
+        covariance = message.covariance[:2, :2]
+        far = np.sqrt(np.einsum("ij,jk,ik->i", rim, np.linalg.inv(covariance), rim))
+        # two deviations, each coordinate to the millimetre
+        millimetre = 0.00071 / np.sqrt(np.linalg.eigvalsh(covariance)[0])
+        np.testing.assert_allclose(far, 2, atol=millimetre)
 
 
 def test_particles_are_shown_where_the_camera_sees_them(assembly):
