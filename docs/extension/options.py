@@ -11,7 +11,15 @@ from typing import Any
 
 from extension.schema import default_text, one_line, type_text, unit_of, variants
 from sim.commands.inspect import experiment_schema, scenario_schema
-from sim.scenario.presets import ONE_CAMERA, ONE_CAMERA_PAPER, PAPER, PERSON_PARTS, ROBUST
+from sim.scenario.presets import (
+    LOSSY,
+    ONE_CAMERA,
+    ONE_CAMERA_PAPER,
+    ONE_CAMERA_ROBUST,
+    PAPER,
+    PERSON_PARTS,
+    ROBUST,
+)
 
 
 @dataclass(frozen=True)
@@ -51,7 +59,9 @@ def preset_reference() -> str:
     special = [
         ("both, in the image plane", dict(_flat(ONE_CAMERA))),
         ("`paper`, in the image plane", dict(_flat(ONE_CAMERA_PAPER))),
+        ("`robust`, in the image plane", dict(_flat(ONE_CAMERA_ROBUST))),
         ("`robust`, of a person on a plane", dict(_flat(PERSON_PARTS))),
+        ("`robust`, where links lose messages", dict(_flat(LOSSY))),
     ]
     keys = sorted({key for column in columns for key in column})
     lines = ["| key | `paper` | `robust` |", "|---|---|---|"]
