@@ -107,10 +107,46 @@ def net_information(posterior: Moments, predicted: Moments, ridge: float) -> Inf
     # the directions with m > 1
     gain = np.where(m > 1, m - 1, 0.0)
     shift = np.where(m > 1, m, 0.0) * (V.T @ np.linalg.solve(L, posterior.mean - predicted.mean))
-    # Λ = L⁻ᵀ V diag(m - 1)₊ Vᵀ L⁻¹, η = Λ v + L⁻ᵀ V e
-    basis = np.linalg.solve(L.T, V)
+    return _from_whitened(np.linalg.solve(L.T, V), gain, shift, predicted.mean)
+
+
+def with_smaller_steps(
+    fitted: Information, posterior: Moments, predicted: Moments, ridge: float
+) -> Information:
+    """A fitted likelihood that moves the prediction no farther than the particles have moved.
+
+    Where a log-likelihood is no quadratic, the fit's slope is extrapolated, most of all where it hardly
+    curves; the sample's mean is not, but is noisy. In each direction the smaller of the two steps is taken.
+
+    Args:
+        fitted: Λ and η of the position, from `fit_log_quadratic`.
+        posterior: u and p of Eq. 13-14.
+        predicted: v and r of Eq. 9-10.
+        ridge: Added to the covariance's diagonal, m².
+    """
+    if not fitted.matrix.any():
+        return fitted
+    # r = L Lᵀ, Lᵀ Λ L = V diag(λ) Vᵀ
+    L = np.linalg.cholesky(regularized(predicted.covariance, ridge))
+    M = L.T @ fitted.matrix @ L
+    curvature, V = np.linalg.eigh((M + M.T) / 2)
+    gain = np.maximum(curvature, 0.0)
+    # (1 + λ) times the step from v: as fitted, Vᵀ Lᵀ (η - Λ v), and to u
+    by_fit = V.T @ (L.T @ (fitted.vector - fitted.matrix @ predicted.mean))
+    to_mean = (1 + gain) * (V.T @ np.linalg.solve(L, posterior.mean - predicted.mean))
+    shift = np.where(np.abs(by_fit) < np.abs(to_mean), by_fit, to_mean)
+    return _from_whitened(np.linalg.solve(L.T, V), gain, np.where(gain > 0, shift, 0.0), predicted.mean)
+
+
+def _from_whitened(
+    basis: Float[np.ndarray, "D D"],
+    gain: Float[np.ndarray, " D"],
+    shift: Float[np.ndarray, " D"],
+    center: Float[np.ndarray, " D"],
+) -> Information:
+    """Λ = B diag(g) Bᵀ and η = Λ v + B e, with B = L⁻ᵀ V."""
     matrix = (basis * gain) @ basis.T
-    return Information((matrix + matrix.T) / 2, matrix @ predicted.mean + basis @ shift)
+    return Information((matrix + matrix.T) / 2, matrix @ center + basis @ shift)
 
 
 def fit_log_quadratic(
@@ -134,14 +170,14 @@ def fit_log_quadratic(
         return no_information(n_axes)
     # one row a component: NumPy is quick along the long axis only
     center = weights @ positions
-    y = np.array((positions - center).T, order="C")
+    y = np.subtract(positions.T, center[:, None], order="C")
     scale = np.sqrt((y * y) @ weights) + 1e-9
     y /= scale[:, None]
     # ℓ ≈ c + yᵀη - ½ yᵀΛy, least squares by its normal equations: y has mean 0 and variance 1
     i, j = upper_triangle(n_axes)
     terms = np.vstack([np.ones_like(log_likelihoods), y, np.where(i == j, -0.5, -1.0)[:, None] * y[i] * y[j]])
     weighted = terms * weights
-    coefficients, _, rank, _ = np.linalg.lstsq(weighted @ terms.T, weighted @ log_likelihoods, rcond=1e-12)
+    coefficients, _, rank, _ = np.linalg.lstsq(weighted @ terms.T, weighted @ log_likelihoods, rcond=1e-14)
     if rank < len(terms):
         return no_information(n_axes)
     matrix = np.zeros((n_axes, n_axes))

@@ -15,6 +15,7 @@ from nodes.filtering.gaussian import (
     moments,
     net_information,
     to_information,
+    with_smaller_steps,
 )
 from nodes.filtering.particles import Particles, reweight
 from nodes.filtering.rules.rule import LocalEstimate
@@ -89,7 +90,9 @@ class LocalGaussians(LocalEstimate):
 
     @property
     def fitted(self) -> Information:
-        """The quadratic fitted to the log-likelihood over the particles."""
+        """The quadratic fitted to the log-likelihood over the particles, by the smaller steps."""
         # halfway between prior and posterior, where the fused result will be
         halfway = reweight(self.result.prior, 0.5 * self.result.log_likelihoods)
-        return fit_log_quadratic(halfway.positions, self.result.log_likelihoods, halfway.weights)
+        fit = fit_log_quadratic(halfway.positions, self.result.log_likelihoods, halfway.weights)
+        posterior, predicted = self.result.posterior.position(), self.result.predicted.position()
+        return with_smaller_steps(fit, posterior, predicted, self.ridge)

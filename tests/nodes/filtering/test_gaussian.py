@@ -15,6 +15,7 @@ from nodes.filtering.gaussian import (
     net_information,
     regularized,
     to_information,
+    with_smaller_steps,
 )
 
 RIDGE = 1e-12
@@ -123,6 +124,34 @@ def test_the_fit_of_a_valley_is_flat():
     points = np.random.default_rng(1).normal(size=(50, 2))
     fitted = fit_log_quadratic(points, points[:, 0] ** 2 - 2 * points[:, 1] ** 2, np.full(50, 0.02))
     np.testing.assert_allclose(fitted.matrix, np.diag([0.0, 4.0]), atol=1e-9)
+
+
+def test_a_fit_and_a_mean_that_agree_are_the_fit():
+    fit = Information(np.array([[3.0, 1.0], [1.0, 2.0]]), np.array([1.0, -2.0]))
+    predicted = Moments(np.array([1.0, 2.0]), np.array([[0.5, 0.2], [0.2, 0.4]]))
+    before = to_information(predicted, RIDGE)
+    mean = np.linalg.solve(before.matrix + fit.matrix, before.vector + fit.vector)
+    limited = with_smaller_steps(fit, Moments(mean, np.eye(2)), predicted, RIDGE)
+    np.testing.assert_allclose(limited.matrix, fit.matrix, atol=1e-9)
+    np.testing.assert_allclose(limited.vector, fit.vector, atol=1e-7)
+
+
+@given(seeds, st.sampled_from([2, 3]))
+def test_in_no_direction_a_fit_moves_farther_than_the_sample_or_than_itself(seed, n):
+    rng = np.random.default_rng(seed)
+    predicted, posterior = random_gaussian(rng, n), random_gaussian(rng, n)
+    fit = to_information(random_gaussian(rng, n), RIDGE)
+    limited = with_smaller_steps(fit, posterior, predicted, RIDGE)
+    np.testing.assert_allclose(limited.matrix, fit.matrix, rtol=1e-6, atol=1e-6)
+    # in coordinates in which the prediction is the identity and the fit is diagonal
+    L = np.linalg.cholesky(predicted.covariance)
+    curvature, V = np.linalg.eigh(L.T @ fit.matrix @ L)
+    steps = [
+        V.T @ L.T @ (each.vector - fit.matrix @ predicted.mean) / (1 + curvature) for each in (fit, limited)
+    ]
+    to_mean = V.T @ np.linalg.solve(L, posterior.mean - predicted.mean)
+    expected = np.where(np.abs(steps[0]) < np.abs(to_mean), steps[0], to_mean)
+    np.testing.assert_allclose(steps[1], expected, rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize("n_points", [1, 3, 5])
