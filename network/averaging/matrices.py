@@ -26,6 +26,8 @@ from network.graphs.spectrum import Spectrum, extremes_of, spectrum_of
 
 Rounds = Iterator[Float[np.ndarray, "C K"]]
 """The values before the first round, after it, after the second, without end."""
+_SMALL = 500
+"""Nodes up to which all rounds may become one full matrix: it has to be made first, and kept."""
 _DENSE = 6
 """So many entries of a full matrix are multiplied in the time of one of a sparse matrix, and more."""
 
@@ -115,7 +117,7 @@ def averaging(
         return next(islice(start(values), iterations, None))
 
     entries = iterations * (n_nodes + 2 * len(graph.edges))
-    if n_nodes**2 > _DENSE * entries:
+    if n_nodes > _SMALL or n_nodes**2 > _DENSE * entries:
         return after
     return after(np.eye(n_nodes)).__matmul__
 

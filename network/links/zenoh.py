@@ -149,7 +149,7 @@ class ZenohTransport:
         with self._changed:
             self._exchange = (take, awaited)
             try:
-                while self._pass_on() and all(self._may_come(sender) for sender in awaited()):
+                while self._pass_on():
                     if not self._wait_until(deadline):
                         break
             finally:
@@ -159,7 +159,7 @@ class ZenohTransport:
             raise failure
 
     def _pass_on(self) -> bool:
-        """Passes on what has come from those who are awaited; returns whether somebody still is."""
+        """Passes on what has come from those who are awaited; returns whether all of these may still come."""
         if self._exchange is None:
             return False
         take, awaited = self._exchange
@@ -171,7 +171,7 @@ class ZenohTransport:
                         self.send(answer)
                     break
             else:
-                return True
+                return all(self._may_come(sender) for sender in senders)
         return False
 
     def _next(self, sender: str) -> PeerMessage | LostMessage | None:

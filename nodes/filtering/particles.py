@@ -24,7 +24,7 @@ class lazy(Generic[T]):  # noqa: N801 - as the property that it is
     """`functools.cached_property` without the lock of Python 3.11, which takes longer than what it guards."""
 
     def __init__(self, compute: Callable[[Any], T]) -> None:
-        self._compute = compute
+        self._compute, self.__doc__ = compute, compute.__doc__
 
     def __get__(self, instance: object, owner: type) -> T:
         # from now on the instance's own attribute is found first

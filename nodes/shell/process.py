@@ -218,6 +218,7 @@ def _rounds(node: SmartCamera, begun: dict[int, float], shell: Shell, frame: int
         for each, end in {} if gone else _ends(node, begun, shell).items():
             if time.monotonic() >= end:
                 _send(node.on_round_deadline(each), shell)
+                break  # who is lost by it is lost for the other frames' rounds, too
     # those of which the time is up
     for each in list(node.open_rounds):
         if frame is not None and each + shell.pace.lag_frames < frame:

@@ -80,6 +80,6 @@ def background_constants(
     fixed = options.calibration == "fixed" or len(surroundings) < 4
     if fixed or np.median(surroundings) < INDISTINCT:
         return options.miss_distance, options.sigma**2
-    # d₀² = 0.5 median d², σ² = d₀² / 36
+    # d₀² = 0.5 median d², σ² = d₀² / 48
     miss_distance = options.background_fraction * float(np.median(surroundings))
     return miss_distance, miss_distance / options.background_ratio

@@ -162,6 +162,12 @@ def test_all_rounds_at_once_are_the_rounds_one_by_one(monkeypatch, net, name, de
         np.testing.assert_allclose(found / scale, expected / scale, atol=1e-13)
 
 
+def test_a_large_network_takes_its_rounds_one_by_one_however_many_they_are(monkeypatch, net):
+    monkeypatch.setattr(matrices, "_SMALL", len(net.names) - 1)
+    monkeypatch.setattr(np, "eye", lambda n: pytest.fail("a full matrix was made"))
+    matrices.averaging(MetropolisWeights(), net, 1000)
+
+
 @pytest.mark.parametrize("name", THEORY)
 def test_the_average_stays(rounds, net, name):
     values = np.random.default_rng(3).normal(size=(len(net.names), 3))

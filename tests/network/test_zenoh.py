@@ -9,6 +9,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections import deque
 from pathlib import Path
 
 import numpy as np
@@ -280,6 +281,23 @@ def test_an_exchange_ends_where_one_who_is_awaited_goes(pair):
     a.exchange(listener.take, listener.awaited, 10.0)  # at once
     assert time.monotonic() - begin < 3.0
     assert listener.rounds == [1]
+
+
+def test_an_exchange_ends_where_one_who_is_gone_becomes_awaited(pair):
+    # in the round that begins with B's message, C is waited for, who is not there
+    a, b = pair
+    a._inboxes["C"] = deque()
+    heard = []
+
+    def take(message):
+        heard.append(message.sender)
+        return ()
+
+    threading.Timer(0.2, b.send, [says("B", 1, 1.0)]).start()
+    begin = time.monotonic()
+    a.exchange(take, lambda: ("B", "C") if heard else ("B",), 5.0)
+    assert time.monotonic() - begin < 2.0
+    assert heard == ["B"]
 
 
 def test_what_fails_in_an_exchange_fails_where_the_node_waits(pair):
