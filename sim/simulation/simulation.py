@@ -2,7 +2,8 @@
 
 Every node keeps its own estimate; nothing stands for the others. Rounds are products with matrices, sparse
 ones of all but small networks (`network.averaging.matrices`), so that a frame costs O(C) for C cameras with
-some neighbours each. Beside them runs the Kalman filter that has all measurements: the exact answer, as CPF is in a run with pictures.
+some neighbours each. Beside them runs the Kalman filter that has all measurements: the exact answer, as CPF
+is in a run with pictures.
 
 What does not depend on the frame before, measurements and errors, is worked out for a block of frames at
 once: in a small network, a call of NumPy takes longer than what it is called for.
