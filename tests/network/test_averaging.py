@@ -164,7 +164,7 @@ def test_all_rounds_at_once_are_the_rounds_one_by_one(monkeypatch, net, name, de
 
 def test_a_large_network_takes_its_rounds_one_by_one_however_many_they_are(monkeypatch, net):
     monkeypatch.setattr(matrices, "_SMALL", len(net.names) - 1)
-    monkeypatch.setattr(np, "eye", lambda n: pytest.fail("a full matrix was made"))
+    monkeypatch.setattr(np, "eye", lambda _: pytest.fail("a full matrix was made"))
     matrices.averaging(MetropolisWeights(), net, 1000)
 
 
