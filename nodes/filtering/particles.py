@@ -183,7 +183,11 @@ def resample(
         least: How many new particles a thread draws at least.
     """
     n, upper_edges = len(particles.log_weights), _upper_edges(particles.weights)
-    ancestors = in_shares(lambda outputs: _ancestors(upper_edges, outputs, n, offset), n, n_threads, least)
-    # the ancestors are particles: nothing is clipped, but checked in another way, with a copy
-    components = particles.states.T.take(ancestors, axis=1, mode="clip")
-    return Particles(components.T, uniform_log_weights(n))
+    components = particles.states.T
+
+    def draw(outputs: slice) -> Float[np.ndarray, "D M"]:
+        # the ancestors are particles: nothing is clipped, but checked in another way, with a copy
+        return components.take(_ancestors(upper_edges, outputs, n, offset), axis=1, mode="clip")
+
+    drawn = in_shares(draw, n, n_threads, least, rows=(len(components),))
+    return Particles(drawn.T, uniform_log_weights(n))

@@ -22,7 +22,7 @@ def test_shares_cover_everything_once(n, n_threads, least):
 
     def work(share):
         shares.append(share)
-        return np.arange(share.start, share.stop)
+        return np.arange(share.start, share.stop, dtype=float)
 
     np.testing.assert_array_equal(in_shares(work, n, n_threads, least), np.arange(n))
     assert len(shares) == n_shares(n, n_threads, least) <= n_threads
