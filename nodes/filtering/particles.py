@@ -184,10 +184,9 @@ def resample(
     """
     n, upper_edges = len(particles.log_weights), _upper_edges(particles.weights)
     components = particles.states.T
-
-    def draw(outputs: slice) -> Float[np.ndarray, "D M"]:
-        # the ancestors are particles: nothing is clipped, but checked in another way, with a copy
-        return components.take(_ancestors(upper_edges, outputs, n, offset), axis=1, mode="clip")
-
-    drawn = in_shares(draw, n, n_threads, least, rows=(len(components),))
+    # the ancestors are particles: nothing is clipped, but checked in another way, with a copy
+    drawn = in_shares(
+        lambda outputs: components.take(_ancestors(upper_edges, outputs, n, offset), axis=1, mode="clip"),
+        *(n, n_threads, least, (len(components),)),
+    )
     return Particles(drawn.T, uniform_log_weights(n))
