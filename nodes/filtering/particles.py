@@ -4,10 +4,8 @@ Source: Arulampalam et al., "A tutorial on particle filters" (2002), Algorithms 
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any, Generic, TypeVar
+from functools import cached_property, lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -16,20 +14,6 @@ from nodes.threads import in_shares
 
 LEAST_OUTPUTS = 75_000
 """New particles that a thread draws at least; for fewer it is hardly worth its start."""
-
-T = TypeVar("T")
-
-
-class lazy(Generic[T]):  # noqa: N801 - as the property that it is
-    """`functools.cached_property` without the lock of Python 3.11, which takes longer than what it guards."""
-
-    def __init__(self, compute: Callable[[Any], T]) -> None:
-        self._compute, self.__doc__ = compute, compute.__doc__
-
-    def __get__(self, instance: object, owner: type) -> T:
-        # from now on the instance's own attribute is found first
-        value = instance.__dict__[self._compute.__name__] = self._compute(instance)
-        return value
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +33,12 @@ class Particles:
         """The position part of the states."""
         return self.states[:, : self.states.shape[1] // 2]
 
-    @lazy
+    @cached_property
     def weights(self) -> Float[np.ndarray, " N"]:
         """The weights themselves."""
         return np.exp(self.log_weights)
 
-    @lazy
+    @cached_property
     def effective_sample_size(self) -> float:
         """1 / Σ ω²: how many equally weighted particles the sample is worth."""
         return float(1 / (self.weights @ self.weights))
