@@ -22,7 +22,7 @@ from network.wire import codec, keys
 from network.wire.messages import ConsensusMessage, PeerMessage
 
 N_NUMBERS = 5
-"""What the net information has on a plane."""
+"""What a camera sends on a plane."""
 ROUNDS = 12
 """Rounds of a turn, as a frame has."""
 PATIENCE_S = 20.0
