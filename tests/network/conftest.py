@@ -1,4 +1,6 @@
-"""For the tests of averaging: all nodes of a network in step, over links that may lose messages."""
+"""All nodes of a network in step, over links that may lose messages; and two of them over real sockets."""
+
+import tempfile
 
 import jaxtyping
 import networkx as nx
@@ -7,6 +9,8 @@ import pytest
 
 from network.graphs import graph
 from network.graphs.graph import Graph
+from network.links.transport import Links
+from network.links.zenoh import ZenohTransport
 from network.rounds.consensus import Consensus
 
 
@@ -79,3 +83,28 @@ def net(request):
 def nets():
     """All of them by name."""
     return NETS
+
+
+@pytest.fixture
+def directory():
+    with tempfile.TemporaryDirectory(prefix="dcpf-", dir="/tmp") as made:  # socket paths must be short
+        yield made
+
+
+@pytest.fixture
+def pair(directory):
+    """Two neighbours A and B in this process; B connects to A."""
+    made = [
+        ZenohTransport(
+            "run", name, Links(neighbors=(other,)), [f"unixsock-stream/{directory}/{name}.sock"],
+            [f"unixsock-stream/{directory}/{other}.sock"] if name == "B" else [], drop_late_pixels=False,
+        )
+        for name, other in ("AB", "BA")
+    ]  # fmt: skip
+    for transport in made:
+        transport.announce()
+    assert made[0].wait_until_alive(["B"], 5.0) == ()
+    assert made[1].wait_until_alive(["A"], 5.0) == ()
+    yield made
+    for transport in made:
+        transport.close()
