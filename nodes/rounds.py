@@ -6,6 +6,7 @@ each of them, and what is known of a neighbour holds for all.
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 
 import numpy as np
 from jaxtyping import Float
@@ -48,8 +49,12 @@ class Rounds:
 
     def awaited(self, frames: Iterable[int]) -> tuple[str, ...]:
         """Neighbours that some frames wait for; none where the first frame's rounds are over."""
-        lanes = [self.of(frame) for frame in frames]
-        return () if not lanes or lanes[0].done else sum((lane.waiting_for() for lane in lanes), ())
+        awaited: tuple[str, ...] = ()
+        for frame in frames:
+            awaited += self.of(frame).waiting_for()
+            if not awaited:
+                break
+        return awaited
 
     def take(self, message: PeerMessage | LostMessage) -> Outgoing:
         """Takes what a link brings: a neighbour's message, or that it is lost; all else is passed over."""
@@ -59,7 +64,8 @@ class Rounds:
 
     def receive(self, message: ConsensusMessage) -> Outgoing:
         """Takes a neighbour's message; who was gone and speaks of these frames is counted on again."""
-        self._silent.pop(message.sender, None)
+        if self._silent:
+            self._silent.pop(message.sender, None)
         if message.sender in self.gone and message.frame > self._frame - len(self._lanes):
             self.restore(message.sender)
         return self.of(message.frame).receive(message)
@@ -95,8 +101,8 @@ class Rounds:
         return sum((self.lose(name) for name in silent), ())
 
     @property
-    def gone(self) -> tuple[str, ...]:
-        """The neighbours that it goes on without, sorted by name."""
+    def gone(self) -> AbstractSet[str]:
+        """The neighbours that it goes on without."""
         return self._lanes[0].gone
 
     @property

@@ -72,9 +72,12 @@ class ZenohTransport:
         self._heard = links.heard()
         self._token_key = keys.alive(run, name)
         self._alive: set[str] = set()
+        self._away = set(self._heard)  # of those who speak to this node
         self._receivers: dict[type, tuple[str, ...]] = dict.fromkeys(links.receivers(), ())  # that are alive
-        self._changed = threading.Condition()  # what has come, who is there: held whenever either is touched
+        self._lock = threading.RLock()  # held whenever what has come, or who is there, is touched
+        self._changed = threading.Condition(self._lock)
         self._exchange: tuple[Take, Callable[[], Sequence[str]]] | None = None  # under way
+        self._awaited: Sequence[str] = ()  # in it
         self._failure: Exception | None = None  # of an exchange, in Zenoh's thread
         self._orders: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._session = sessions.open_peer(listen, connect)
@@ -96,7 +99,7 @@ class ZenohTransport:
     def wait_until_alive(self, names: Iterable[str], timeout_s: float) -> tuple[str, ...]:
         """Waits until nodes are alive; returns those that are still missing when time is up."""
         names = tuple(names)
-        with self._changed:
+        with self._lock:
             self._changed.wait_for(lambda: self._alive.issuperset(names), timeout_s)
             return tuple(name for name in names if name not in self._alive)
 
@@ -137,7 +140,7 @@ class ZenohTransport:
     def receive(self, sender: str, timeout_s: float) -> PeerMessage | LostMessage | None:
         """The next valid message of a linked node, None when time is up or the sender is gone."""
         deadline = time.monotonic() + timeout_s
-        with self._changed:
+        with self._lock:
             while (message := self._next(sender)) is None and self._may_come(sender):
                 if not self._wait_until(deadline):
                     break
@@ -146,12 +149,11 @@ class ZenohTransport:
     def exchange(self, take: Take, awaited: Callable[[], Sequence[str]], timeout_s: float) -> None:
         """Hears neighbours and answers them in Zenoh's thread, until nobody is awaited, or can be."""
         deadline = time.monotonic() + timeout_s
-        with self._changed:
-            self._exchange = (take, awaited)
+        with self._lock:
+            self._exchange, self._awaited = (take, awaited), awaited()
             try:
-                while self._pass_on():
-                    if not self._wait_until(deadline):
-                        break
+                while self._pass_on() and self._wait_until(deadline):
+                    pass
             finally:
                 self._exchange = None
             failure, self._failure = self._failure, None
@@ -163,15 +165,16 @@ class ZenohTransport:
         if self._exchange is None:
             return False
         take, awaited = self._exchange
-        while senders := awaited():
-            for sender in senders:
+        while self._awaited:
+            for sender in self._awaited:
                 message = self._next(sender)
                 if message is not None:
                     for answer in take(message):
                         self.send(answer)
+                    self._awaited = awaited()
                     break
             else:
-                return all(self._may_come(sender) for sender in senders)
+                return not self._away or all(self._may_come(sender) for sender in self._awaited)
         return False
 
     def _next(self, sender: str) -> PeerMessage | LostMessage | None:
@@ -225,7 +228,7 @@ class ZenohTransport:
     def _on_sample(self, inbox: deque[zenoh.Sample], sample: zenoh.Sample) -> None:
         """In Zenoh's thread: a message has come, and rounds go on right here where they wait for it."""
         threads.keep_state()
-        with self._changed:
+        with self._lock:
             inbox.append(sample)
             try:
                 goes_on = self._pass_on()
@@ -257,11 +260,12 @@ class ZenohTransport:
             name = keys.node_of(str(sample.key_expr))
         except ValueError:  # somebody else's token
             return
-        with self._changed:
+        with self._lock:
             if sample.kind == zenoh.SampleKind.PUT:
                 self._alive.add(name)
             else:
                 self._alive.discard(name)
+            self._away = self._heard.keys() - self._alive
             self._receivers = {
                 kind: tuple(other for other in others if other in self._alive)
                 for kind, others in self._links.receivers().items()

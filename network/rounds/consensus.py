@@ -38,6 +38,7 @@ class Consensus:
         rounds_done: Rounds done in this frame.
         rounds_in_all: Rounds done in all frames.
         done: Whether this frame's rounds are over.
+        gone: The neighbours that it goes on without.
         counters: Messages that were of no use, by reason; those that came after their round and still served
             (``late``); those that their round was done without (``missed``); frames that were ``cut``.
     """
@@ -74,7 +75,7 @@ class Consensus:
         self._state: Any = None  # of the algorithm's own type; None before the first frame
         self._said: ConsensusMessage  # in this round
         self._position = _NOWHERE
-        self._gone: set[str] = set()
+        self.gone: set[str] = set()
         self._absent: set[str] = set()  # in this frame: the gone, also those restored during it
         self._present: list[str] = []  # neighbours of this frame: neither absent nor heard in a later one
         self._awaited: list[str] = []  # those of them that have said nothing yet in this round
@@ -93,11 +94,6 @@ class Consensus:
         return self._membership.members(max(self._position[0], 0))
 
     @property
-    def gone(self) -> tuple[str, ...]:
-        """The neighbours that it goes on without, sorted by name."""
-        return tuple(sorted(self._gone))
-
-    @property
     def heard(self) -> Mapping[str, int]:
         """The latest frame in which each neighbour has spoken, -1 for one that never has."""
         return {name: frame for name, (frame, _) in self._heard.items()}
@@ -114,7 +110,7 @@ class Consensus:
         self._state = self._algorithm.begin(tuple(value.tolist()), self._state)
         self.rounds_done = 0
         self.done = False
-        self._absent = set(self._gone)
+        self._absent = set(self.gone)
         self._present = [
             name for name, last in self._heard.items() if name not in self._absent and last < (frame + 1, 0)
         ]
@@ -145,13 +141,13 @@ class Consensus:
 
     def drop(self, neighbor: str) -> tuple[ConsensusMessage, ...]:
         """Goes on without a neighbour from now on; what it has said for this round still counts."""
-        self._gone.add(neighbor)
+        self.gone.add(neighbor)
         self._leave_out(neighbor)
         return self._advance()
 
     def restore(self, neighbor: str) -> None:
         """Counts on a neighbour again, from the next frame on."""
-        self._gone.discard(neighbor)
+        self.gone.discard(neighbor)
 
     def miss(self, neighbor: str, frame: int, round_: int) -> tuple[ConsensusMessage, ...]:
         """A neighbour's message is known not to come: its round is done without it."""

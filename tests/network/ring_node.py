@@ -65,7 +65,7 @@ def camera(transport, spec):
         "missing": missing,
         "values": values,
         "unused": dict(consensus.counters),
-        "gone": sorted(consensus._gone),
+        "gone": sorted(consensus.gone),
     }
 
 
