@@ -34,9 +34,10 @@ def bench_consensus(
         done: Called after each network.
 
     Returns:
-        For each network, such as `ring-4`: medians over turns and nodes of a round's time (`round_us`), of an
-        exchange of the same bytes over Zenoh (`bare_zenoh_us`) and sockets (`plain_socket_us`), and the
-        processor time of a node and round (`cpu_us`).
+        For each network, such as `ring-4`: medians over turns and nodes, in µs, of a round's time
+        (`round_us`), of an exchange of the same bytes over Zenoh as it comes (`bare_zenoh_us`), with its
+        threads set as a node sets them (`bare_zenoh_tuned_us`), and over sockets (`plain_socket_us`); with
+        `_cpu_us` in place of `_us`, the processor time that a round takes a node.
 
     Raises:
         RunFailed: The nodes did not get through.

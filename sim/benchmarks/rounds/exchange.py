@@ -5,8 +5,9 @@ the same kind of session, publisher and channels; and plain Unix sockets.
 """
 
 import socket
+import time
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 import zenoh
@@ -15,11 +16,12 @@ from zenoh import CongestionControl, Locality, Priority
 from network.averaging.metropolis import MetropolisWeights
 from network.graphs.graph import Graph
 from network.links import sessions
-from network.links.transport import Links, LostMessage
+from network.links.transport import Links
 from network.links.zenoh import ZenohTransport
 from network.rounds.consensus import Consensus
 from network.wire import codec, keys
-from network.wire.messages import ConsensusMessage, PeerMessage
+from network.wire.messages import ConsensusMessage
+from nodes.rounds import Rounds
 
 N_NUMBERS = 5
 """What a camera sends on a plane."""
@@ -28,57 +30,64 @@ ROUNDS = 12
 PATIENCE_S = 20.0
 
 
-class Exchange(Protocol):
+class Exchange(ABC):
     """A way to exchange messages."""
 
+    @abstractmethod
     def turn(self) -> None:
         """Says something to all neighbours and hears all of them, `ROUNDS` times."""
 
+    def timed(self) -> tuple[float, float]:
+        """Takes a turn; returns the time of a round and the processor time that it takes the node, in s."""
+        began, processor = time.perf_counter(), time.process_time()
+        self.turn()
+        return (time.perf_counter() - began) / ROUNDS, (time.process_time() - processor) / ROUNDS
 
-class ConsensusRounds:
+
+class ConsensusRounds(Exchange):
     """The rounds of a run: `network.rounds` over `network.links.zenoh`."""
 
-    def __init__(self, run: str, name: str, graph: Graph, folder: str) -> None:
+    def __init__(self, run: str, name: str, graph: Graph, prefix: str) -> None:
         """Opens the node's transport and waits for its neighbours.
 
         Args:
             run: Name of the run.
             name: The node.
             graph: Who talks to whom.
-            folder: Of the sockets.
+            prefix: Of the sockets' paths.
         """
         links = Links(neighbors=graph.neighbors(name))
-        listen, connect = _endpoints(name, graph, f"{folder}/t")
+        listen, connect = _endpoints(name, graph, prefix)
         self._transport = ZenohTransport(run, name, links, listen, connect, drop_late_pixels=False)
         self._transport.announce()
         self._transport.wait_until_alive(links.neighbors, PATIENCE_S)
-        self._consensus = Consensus(name, links.neighbors, MetropolisWeights().tuned(graph, ROUNDS), ROUNDS)
+        algorithm = MetropolisWeights().tuned(graph, ROUNDS)
+        self._name, self._rounds = name, Rounds([Consensus(name, links.neighbors, algorithm, ROUNDS)])
         self._frame = 0
 
     def turn(self) -> None:
         """A frame."""
-        consensus = self._consensus
-        for said in consensus.begin(self._frame, np.arange(N_NUMBERS, dtype=float)):
+        for said in self._rounds.begin(self._frame, np.arange(N_NUMBERS, dtype=float)):
             self._transport.send(said)
-        self._transport.exchange(self._take, consensus.waiting_for, PATIENCE_S)
-        if not consensus.done:
-            raise TimeoutError(f"{consensus.name} heard nothing of {', '.join(consensus.waiting_for())}")
+        self._transport.exchange(self._rounds.take, self._awaited, PATIENCE_S)
+        if awaited := self._awaited():
+            raise TimeoutError(f"{self._name} heard nothing of {', '.join(awaited)}")
         self._frame += 1
 
-    def _take(self, message: PeerMessage | LostMessage) -> tuple[ConsensusMessage, ...]:
-        return self._consensus.receive(message) if isinstance(message, ConsensusMessage) else ()
+    def _awaited(self) -> tuple[str, ...]:
+        return self._rounds.awaited((self._frame,))
 
     def close(self) -> None:
         """Leaves the network."""
         self._transport.close()
 
 
-class BareZenoh:
+class BareZenoh(Exchange):
     """A publisher, a channel for each neighbour, and bytes."""
 
-    def __init__(self, run: str, name: str, graph: Graph, folder: str) -> None:
+    def __init__(self, run: str, name: str, graph: Graph, prefix: str) -> None:
         """Opens a session of its own, of the same kind (see `ConsensusRounds`)."""
-        listen, connect = _endpoints(name, graph, f"{folder}/b")
+        listen, connect = _endpoints(name, graph, prefix)
         self._session = sessions.open_peer(listen, connect)
         self._inboxes = [
             self._session.declare_subscriber(keys.consensus(run, other), zenoh.handlers.RingChannel(64))
@@ -105,7 +114,7 @@ class BareZenoh:
         sessions.close(self._session)
 
 
-class PlainSockets:
+class PlainSockets(Exchange):
     """A stream socket for each neighbour: what the operating system takes, and Python to call it."""
 
     def __init__(self, run: str, name: str, ends: Sequence[socket.socket]) -> None:

@@ -14,13 +14,13 @@ from typing import Any
 
 from network.graphs.graph import Graph
 from sim.benchmarks.rounds.exchange import (
-    ROUNDS,
     BareZenoh,
     ConsensusRounds,
     Exchange,
     PlainSockets,
     connected,
 )
+from sim.benchmarks.rounds.untuned import UntunedZenoh
 from sim.scenario.model import GRAPHS
 
 _RUN = "bench"
@@ -62,41 +62,44 @@ def main() -> int:
 def _be_node(
     name: str, graph: Graph, order: dict[str, Any], sockets: PlainSockets, write: int, hold: int
 ) -> None:
-    """A node: all three ways in turn, several times over, and then the medians."""
-    consensus = ConsensusRounds(_RUN, name, graph, order["folder"])
-    bare = BareZenoh(_RUN, name, graph, order["folder"])
+    """A node: all ways in turn, several times over, and then the medians."""
+    folder = order["folder"]
+    untuned = UntunedZenoh(_RUN, name, graph, f"{folder}/u", (write, hold))  # forks: before all sessions
+    consensus = ConsensusRounds(_RUN, name, graph, f"{folder}/t")
+    bare = BareZenoh(_RUN, name, graph, f"{folder}/b")
     # a first turn over sockets, which are there already, so that nobody speaks before all can hear
     time.sleep(order["settle_s"])
     sockets.rounds(len(graph.names))
     ways: dict[str, Exchange] = {
-        "round_us": consensus,
-        "bare_zenoh_us": bare,
-        "plain_socket_us": sockets,
+        "round": consensus,
+        "bare_zenoh": untuned,
+        "bare_zenoh_tuned": bare,
+        "plain_socket": sockets,
     }
     os.write(write, json.dumps(_timed(ways, sockets, len(graph.names), order["turns"])).encode())
     os.close(write)
     os.read(hold, 1)  # a goodbye could overtake the last messages to the others
     consensus.close()
     bare.close()
+    untuned.close()
 
 
 def _timed(ways: dict[str, Exchange], barrier: PlainSockets, n_nodes: int, turns: int) -> dict[str, float]:
-    """The median time of a round of each way, and the processor time of one of a run's rounds, in µs."""
-    wall: dict[str, list[float]] = {name: [] for name in ways}
-    cpu: list[float] = []
+    """The medians of a round's time and of the node's processor time in it, in µs, for each way."""
+    times: dict[str, list[tuple[float, float]]] = {name: [] for name in ways}
     order = deque(ways.items())
     for turn in range(turns + 1):
         order.rotate()  # nobody is always the first
         for name, way in order:
             # everybody begins a turn together: after as many rounds as nodes, all have heard of all
             barrier.rounds(n_nodes)
-            began, processor = time.perf_counter(), time.process_time()
-            way.turn()
+            timed = way.timed()
             if turn:  # the first warms up
-                wall[name].append((time.perf_counter() - began) / ROUNDS)
-                if name == "round_us":
-                    cpu.append((time.process_time() - processor) / ROUNDS)
-    return {name: 1e6 * median(times) for name, times in wall.items()} | {"cpu_us": 1e6 * median(cpu)}
+                times[name].append(timed)
+    medians = {name: [1e6 * median(each) for each in zip(*its, strict=True)] for name, its in times.items()}
+    return {f"{name}_us": wall for name, (wall, _) in medians.items()} | {
+        f"{name}_cpu_us": cpu for name, (_, cpu) in medians.items()
+    }
 
 
 def _read_all(descriptor: int) -> bytes:
