@@ -1,7 +1,6 @@
 """Launches a run: one process a node, one for the router; listens as anybody could; ends them all."""
 
 import logging
-import queue
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -10,29 +9,26 @@ from pathlib import Path
 
 import zenoh
 
-from network.errors import RefusedMessage
 from network.links import sessions
 from network.links.publishers import publish
-from network.wire import codec, keys
-from network.wire.messages import ControlMessage, EstimateMessage, PreviewMessage, StatusMessage, TruthMessage
+from network.wire.messages import ControlMessage, EstimateMessage, StatusMessage
 from sim.assembly import Assembly
 from sim.faults.orders import Orders
 from sim.results.recorder import Recorder, expected_tracks
 from sim.results.results import Results
 from sim.running.children import Children, RunFailed
 from sim.running.endpoints import run_endpoints
+from sim.running.hearing import Heard, Hearing, Token
+from sim.running.told_truth import ToldTruth
 
 _log = logging.getLogger(__name__)
 START_LIMIT_S = 60.0
 """How long the nodes of the launcher have for getting ready."""
-IDLE_S = 0.1
 STUCK_DEADLINES = 4
 """When nothing at all is heard for so many deadlines, those that have not finished are given up."""
 LEAD_S = 0.2
 """In real time, frame 0 begins this long after the order to start."""
 
-Heard = EstimateMessage | StatusMessage | PreviewMessage
-"""What nodes tell."""
 Progress = Callable[[int], None]
 """Told the number of frames that are done."""
 
@@ -66,12 +62,14 @@ class Launch:
         self.results = Results(assembly.scenario)
         self.dead: list[str] = []
         self._assembly, self._recorder, self._progress, self._by_hand = assembly, recorder, progress, by_hand
-        self._heard: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
         self._nodes = {node for _, node in expected_tracks(assembly.scenario)}
+        self._hearing = Hearing(
+            assembly.scenario.name,
+            self._nodes,
+            lambda node, reason: recorder.event("refused", node, reason=reason),
+        )
+        self._truth = ToldTruth(assembly, self.results, recorder)
         self._absent_since: dict[str, float] = {}
-        self._last_heard = time.monotonic()
-        self._refused: set[tuple[str, str]] = set()
-        self._truth_next = 0
         self._frames_done = 0
         self._orders = Orders(assembly.scenario.faults)
         self._killed: set[str] = set()  # by the scenario's faults, and not started again
@@ -92,7 +90,7 @@ class Launch:
         recorded = self._recorder.folder
         # The truth is known without the processes: it is written when they have gone, however that was.
         with ExitStack() as ends, ExitStack() as stack:
-            ends.callback(self._record_truth)
+            ends.callback(lambda: self._truth.record(self._frames_done))
             children = stack.enter_context(
                 Children(recorded / "scenario.yaml", recorded / "logs", folder, self._by_hand)
             )
@@ -101,14 +99,14 @@ class Launch:
             stack.callback(sessions.close, session)
             # However it ends, nodes that somebody else has started shall know.
             stack.callback(publish, session, self._assembly.scenario.name, ControlMessage("stop"))
-            self._listen(session)
+            self._hearing.listen(session, previews=self._recorder.filming)
             self._wait_until_ready(children)
             if self._audience is not None:
                 waiting = time.monotonic()
                 self._audience()
                 self._began += time.monotonic() - waiting  # whose time it is not
             self._start(session)
-            started = self._last_heard = time.monotonic()
+            started = self._hearing.last_s = time.monotonic()
             for message in self._messages(children):
                 self._take(message, session)
                 for what, whom in self._orders.due(self._frames_done):
@@ -118,17 +116,8 @@ class Launch:
                     self.results.timing["first_estimate_s"] = round(time.monotonic() - self._began, 3)
             elapsed = time.monotonic() - started
             self.results.timing["frames_per_s"] = round(self._assembly.scenario.frames / elapsed, 2)
-            self._tell_truth(session, self._frames_done)
+            self._truth.tell(session, self._frames_done)
         return self.results
-
-    def _listen(self, session: zenoh.Session) -> None:
-        run = self._assembly.scenario.name
-        hear = zenoh.handlers.Callback(self._heard.put, indirect=False)
-        session.declare_subscriber(keys.estimate(run), hear)
-        session.declare_subscriber(keys.status(run), hear)
-        if self._recorder.filming:
-            session.declare_subscriber(keys.preview(run), hear)
-        session.liveliness().declare_subscriber(keys.alive(run), hear, history=True)
 
     def _wait_until_ready(self, children: Children) -> None:
         """The start barrier: every node hears those that it has to."""
@@ -169,7 +158,7 @@ class Launch:
                 if message.state == "failed":
                     self._bury(message.node, "left", "left before the end")
             ended.update(children.ended())
-            if not self._heard.empty():
+            if self._hearing.is_behind:
                 continue  # what they said before is heard first
             working -= self._settle(children, working, ended)
             for name in sorted((working - ended.keys()) & self._silent()):
@@ -203,7 +192,7 @@ class Launch:
     def _stuck(self, working: set[str]) -> set[str]:
         """Nodes that are there but have told nothing since everybody was waited for: spinning, or hung."""
         limit = time.monotonic() - STUCK_DEADLINES * self._assembly.scenario.network.deadline_s
-        return working if self._last_heard < limit else set()
+        return working if self._hearing.last_s < limit else set()
 
     def _silent(self) -> set[str]:
         """Nodes that have been away for longer than anybody waits for them: stopped, or dead elsewhere."""
@@ -219,38 +208,20 @@ class Launch:
 
     def _next(self) -> Heard | None:
         """The next valid message, None if there is none for a while."""
-        try:
-            sample = self._heard.get(timeout=IDLE_S)
-        except queue.Empty:
-            return None
-        self._last_heard = time.monotonic()
-        key, data = str(sample.key_expr), sample.payload.to_bytes()
-        _, _, node, kind = key.split("/")
-        if node not in self._nodes:
-            return None  # somebody else's
-        if kind == "alive":
-            self._see(node, here=sample.kind == zenoh.SampleKind.PUT)
-            return None
-        try:
-            return _decode(node, kind, data)
-        except RefusedMessage as refusal:
-            if (node, refusal.reason) not in self._refused:
-                self._recorder.event("refused", node, reason=refusal.reason)
-            self._refused.add((node, refusal.reason))
-            return None
-
-    def _see(self, node: str, *, here: bool) -> None:
-        """A node's token has come or gone."""
-        if here:
-            self._absent_since.pop(node, None)
+        heard = self._hearing.next()
+        if not isinstance(heard, Token):
+            return heard
+        if heard.here:
+            self._absent_since.pop(heard.node, None)
         else:
-            self._absent_since[node] = time.monotonic()
-        self._recorder.event("seen" if here else "lost", node, frame=self._frames_done)
+            self._absent_since[heard.node] = time.monotonic()
+        self._recorder.event("seen" if heard.here else "lost", heard.node, frame=self._frames_done)
+        return None
 
     def _take(self, message: Heard | None, session: zenoh.Session) -> None:
         if message is None:
             if self._assembly.scenario.pace == "realtime":
-                self._tell_truth(session, min(self._truth_next + 1, self._frames_done))
+                self._truth.tell_one(session, self._frames_done)
             return
         self.results.add(message)
         self._recorder.add(message)
@@ -260,44 +231,4 @@ class Launch:
             self._frames_done = message.frame + 1
             self._progress(self._frames_done)
             if self._watched:
-                self._tell_truth(session, self._frames_done)
-
-    def _record_truth(self) -> None:
-        """Records the truth of frames that are done and not told: those of an interrupted run, in short."""
-        for frame in range(self._truth_next, self._frames_done):
-            message = self._assembly.truth_message(frame, with_visibility=False)
-            if message is not None:
-                self.results.add(message)
-                self._recorder.add(message)
-
-    def _tell_truth(self, session: zenoh.Session, until: int) -> None:
-        """Publishes and records the truth of frames that are done.
-
-        Working out what each camera sees takes some time: in real time it is done when nothing else is, in
-        lockstep, where every processor is busy to the end, after the frames, unless somebody looks on.
-        """
-        while self._truth_next < until:
-            message: TruthMessage | None = self._assembly.truth_message(self._truth_next)
-            self._truth_next += 1
-            if message is not None:
-                publish(session, self._assembly.scenario.name, message)
-                self.results.add(message)
-                self._recorder.add(message)
-
-
-def _decode(node: str, kind: str, data: bytes) -> Heard:
-    """What a node tells, under a key of its own.
-
-    Raises:
-        RefusedMessage: It is something else, or of somebody else.
-    """
-    message: Heard
-    if kind == "estimate":
-        message = codec.decode_public(EstimateMessage, data)
-    elif kind == "preview":
-        message = codec.decode_preview(data)
-    else:
-        message = codec.decode_public(StatusMessage, data)
-    if message.node != node:
-        raise RefusedMessage("sender")
-    return message
+                self._truth.tell(session, self._frames_done)
