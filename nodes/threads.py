@@ -9,50 +9,29 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 
-import numpy as np
-from jaxtyping import Float
-
 
 def n_shares(n: int, n_threads: int, least: int) -> int:
     """Threads that n particles keep busy: no more than `n_threads`, each with `least` or more."""
     return max(1, min(n_threads, n // least))
 
 
-def in_shares(
-    work: Callable[[slice], Float[np.ndarray, "*R m"]],
-    n: int,
-    n_threads: int,
-    least: int,
-    rows: tuple[int, ...] = (),
-) -> Float[np.ndarray, "*R n"]:
+def in_shares(work: Callable[[slice], object], n: int, n_threads: int, least: int) -> None:
     """Does work on n particles, in equal shares at the same time.
 
     Args:
-        work: From a share to its results, along the last axis.
+        work: Works on a share, and puts what it finds where it belongs.
         n: How many there are.
         n_threads: Threads, this one included.
         least: Particles of a share below which another thread costs more than it saves.
-        rows: The other axes of the results; none where they are a number for each particle.
-
-    Returns:
-        The results of all shares, one after the other.
     """
     k = n_shares(n, n_threads, least)
-    if k == 1:
-        return work(slice(0, n))
-    results = np.empty((*rows, n))
-
-    def put(share: slice) -> None:
-        results[..., share] = work(share)
-
     own, *others = (slice(n * i // k, n * (i + 1) // k) for i in range(k))
-    running = [_pool(n_threads - 1, os.getpid()).submit(put, share) for share in others]
+    running = [_pool(n_threads - 1, os.getpid()).submit(work, share) for share in others]
     try:
-        put(own)
+        work(own)
     finally:
         for each in running:
             each.result()
-    return results
 
 
 @lru_cache(maxsize=1)

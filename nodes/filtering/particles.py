@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from jaxtyping import Float, Int
 
-from nodes.threads import in_shares
+from nodes.threads import in_shares, n_shares
 
 LEAST_OUTPUTS = 75_000
 """New particles that a thread draws at least; for fewer it is hardly worth its start."""
@@ -169,8 +169,16 @@ def resample(
     n, upper_edges = len(particles.log_weights), _upper_edges(particles.weights)
     components = particles.states.T
     # the ancestors are particles: nothing is clipped, but checked in another way, with a copy
-    drawn = in_shares(
-        lambda outputs: components.take(_ancestors(upper_edges, outputs, n, offset), axis=1, mode="clip"),
-        *(n, n_threads, least, (len(components),)),
-    )
+    if n_shares(n, n_threads, least) == 1:
+        ancestors = _ancestors(upper_edges, slice(0, n), n, offset)
+        return Particles(components.take(ancestors, axis=1, mode="clip").T, uniform_log_weights(n))
+    drawn = np.empty(components.shape)
+
+    def draw(outputs: slice) -> None:
+        ancestors = _ancestors(upper_edges, outputs, n, offset)
+        # component by component: its share of a row is one piece of memory, and nothing is copied again
+        for component, row in zip(components, drawn, strict=True):
+            component.take(ancestors, mode="clip", out=row[outputs])
+
+    in_shares(draw, n, n_threads, least)
     return Particles(drawn.T, uniform_log_weights(n))

@@ -18,7 +18,7 @@ from nodes.counting.histogram import SamplingOptions, locate
 from nodes.imaging.camera import Camera
 from nodes.simd.likelihood import SimdLikelihood
 from nodes.simd.options import SimdOptions
-from nodes.threads import in_shares
+from nodes.threads import in_shares, n_shares
 from nodes.vision.appearance import (
     Appearance,
     ModelUpdateOptions,
@@ -216,12 +216,16 @@ class ObservationModel:
         pattern = pattern_of(appearance, self.options.color)
         if self.processor is not None:
             return self._on_array(picture, boxes, pattern, self.processor)
-        if self.options.threads == 1:
+        n, n_threads = len(boxes), self.options.threads
+        if n_shares(n, n_threads, LEAST_BOXES) == 1:
             return self._share_distances(picture, boxes, pattern)
-        return in_shares(
-            lambda share: self._share_distances(picture, boxes[share], pattern),
-            *(len(boxes), self.options.threads, LEAST_BOXES),
-        )
+        distances = np.empty(n)
+
+        def measure(share: slice) -> None:
+            distances[share] = self._share_distances(picture, boxes[share], pattern)
+
+        in_shares(measure, n, n_threads, LEAST_BOXES)
+        return distances
 
     def _share_distances(
         self, picture: Picture, boxes: Float[np.ndarray, "N 4"], pattern: Pattern

@@ -13,7 +13,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from jaxtyping import Float
 from threadpoolctl import threadpool_limits
 
 from nodes.filtering.motion import predict
@@ -101,8 +100,10 @@ def _steps(chosen: Setting, n_threads: int) -> dict[str, Times]:
     predicted = Particles(moved, chosen.particles.log_weights)
     boxes = chosen.boxes
 
-    def measure(share: slice) -> Float[np.ndarray, " N"]:
-        return model.box_distances(chosen.picture, boxes[share], chosen.appearance)
+    distances = np.empty(len(boxes))
+
+    def measure(share: slice) -> None:
+        distances[share] = model.box_distances(chosen.picture, boxes[share], chosen.appearance)
 
     log_likelihoods = model.log_likelihoods(chosen.picture, predicted.positions, chosen.appearance)
     weighted = reweight(predicted, log_likelihoods)
