@@ -107,6 +107,11 @@ class ConditionsOptions(LinkOptions):
         return any(link.loss for link in (self, *self.links))
 
     @property
+    def vary(self) -> bool:
+        """Whether some link takes longer for one message than for another of the same length."""
+        return any(link.jitter_s for link in (self, *self.links))
+
+    @property
     def latest_round_s(self) -> float:
         """How long a message is on its way at the most, on the slowest link while its line is free, in s."""
         return max(link.latest_s for link in (self, *self.links))
