@@ -148,11 +148,12 @@ def _network(results: Results, assembly: Assembly) -> list[Plot]:
     convergence.set_size_inches(7.4, 3.4)
     apart = "How far the nodes' estimates are from each other"
     rounds = "How the rounds of a frame bring any values together"
+    start = "one start" if found[name].expected is None else "the worst start, against theory"
     return [
         Plot(inline(plot_disagreement(results), "disagreement", apart), f"{apart}, over the frames."),
         Plot(
             inline(convergence, "rounds", rounds),
-            f"{rounds} on this graph: the worst start, against theory.",
+            f"{rounds} on this graph, over perfect links: {start}.",
             wide=True,
         ),
     ]
