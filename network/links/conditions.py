@@ -107,6 +107,11 @@ class ConditionsOptions(LinkOptions):
         return any(link.loss for link in (self, *self.links))
 
     @property
+    def vary(self) -> bool:
+        """Whether some link takes longer for one message than for another of the same length."""
+        return any(link.jitter_s for link in (self, *self.links))
+
+    @property
     def latest_round_s(self) -> float:
         """How long a message is on its way at the most, on the slowest link while its line is free, in s."""
         return max(link.latest_s for link in (self, *self.links))
@@ -119,8 +124,15 @@ class ConditionsOptions(LinkOptions):
                 found = each
         return found
 
-    def require_links(self, edges: Collection[tuple[str, str]], names: Collection[str]) -> None:
-        """Checks that everybody and every link that is named is there.
+    def require_possible(
+        self, edges: Collection[tuple[str, str]], names: Collection[str], frames: int
+    ) -> None:
+        """Checks that everybody and every link that is named is there, and that all partitions come about.
+
+        Args:
+            edges: The graph's links.
+            names: The cameras.
+            frames: Frames of the run.
 
         Raises:
             ValueError: One is not; the message names it.
@@ -137,6 +149,12 @@ class ConditionsOptions(LinkOptions):
                 raise ValueError(
                     f"network.conditions.partitions names {name}, which is no camera: name some of"
                     f" {', '.join(names)}"
+                )
+        for partition in self.partitions:
+            if partition.first_frame >= frames:
+                raise ValueError(
+                    f"network.conditions.partitions has one from frame {partition.first_frame} on: the run"
+                    f" ends with frame {frames - 1}, take an earlier one"
                 )
 
 

@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from network.graphs.spectrum import spectrum_of
+from network.graphs.spectrum import LARGEST_DENSE, extremes_of
 from sim.commands.shared import AsJson, Overrides, ScenarioPath, Seed, progress_bar, read_scenario
 from sim.results.recorder import RecordingError
 from sim.scenario.model import Scenario
@@ -37,7 +37,7 @@ def consensus(
     out: Annotated[Path | None, typer.Option(help="Folder of the results.", show_default=False)] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Compare averaging algorithms on a scenario's graph: convergence against theory, and bytes."""
+    """Compare averaging algorithms on a scenario's graph, on perfect links: convergence and bytes."""
     # SciPy takes its time to import, and only this needs it.
     from sim.results.convergence import ALGORITHMS, converge
 
@@ -46,7 +46,17 @@ def consensus(
         if name not in ALGORITHMS:
             raise ScenarioError(f"there is no algorithm {name}: choose among {', '.join(ALGORITHMS)}")
     given = [*(overrides or []), *([f"network.graph={graph}"] if graph else [])]
-    read = read_scenario(scenario, given, seed=seed)
+    read = read_scenario(scenario, given, seed=seed, rendered=False)
+    if len(read.cameras) < 2:
+        raise ScenarioError(f"{read.name} has one camera, and nobody to average with: name another scenario")
+    if not (rounds or read.network.iterations):
+        raise ScenarioError(f"{read.name}: network.iterations is 0, and nothing averages: give --rounds")
+    if not read.network.conditions.are_perfect:
+        Console(stderr=True, highlight=False).print(
+            f"dcpf: {read.name}: network.conditions is left out: the algorithms are compared on perfect"
+            " links; dcpf run has one of them on these",
+            soft_wrap=True,
+        )
     found: dict[str, Convergence] = {}
     with progress_bar("algorithms", len(chosen)) as bar:
         for name, each in converge(read, chosen, rounds):
@@ -71,13 +81,14 @@ def _title(scenario: Scenario, graph: str | None) -> str:
 
 
 def _graph_facts(scenario: Scenario, title: str) -> dict[str, Any]:
-    graph, eigenvalues = scenario.graph, spectrum_of(scenario.graph).eigenvalues
+    graph, eigenvalues = scenario.graph, extremes_of(scenario.graph).eigenvalues
     return {
         "name": title,
         "nodes": list(graph.names),
         "edges": sorted(map(list, graph.edges)),
         "max_degree": graph.max_degree,
         "eigenvalues": list(eigenvalues),
+        "has_all_eigenvalues": len(graph.names) <= LARGEST_DENSE,
     }
 
 
@@ -106,12 +117,12 @@ def _write(report: dict[str, Any], title: str, found: "dict[str, Convergence]", 
 
 def _print(report: dict[str, Any], title: str, folder: Path) -> None:
     console, facts = Console(highlight=False), report["graph"]
-    eigenvalues = facts["eigenvalues"] or [0.0]
+    eigenvalues = facts["eigenvalues"]
     rounds = max(len(each["residual"]) for each in report["algorithms"].values())
+    distinct = f", {len(eigenvalues)} distinct non-zero eigenvalues" if facts["has_all_eigenvalues"] else ""
     console.print(
         f"{title}, {rounds} rounds: {len(facts['edges'])} links, largest degree {facts['max_degree']},"
-        f" λ₂ = {eigenvalues[0]:.3g}, λ_N = {eigenvalues[-1]:.3g},"
-        f" {len(facts['eigenvalues'])} distinct non-zero eigenvalues",
+        f" λ₂ = {eigenvalues[0]:.3g}, λ_N = {eigenvalues[-1]:.3g}{distinct}",
         soft_wrap=True,
     )
     table = Table()

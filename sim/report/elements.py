@@ -85,6 +85,8 @@ class RunReport:
         moments: Pictures of the cameras.
         shown: What is drawn in them: `dcpf`, `cpf`, `truth`.
         network: Plots of how the cameras agree.
+        messages: What became of the messages of the rounds.
+        events: Who was lost, and came back.
         links: Bytes and messages of each link.
         timing: How long it took.
         scenario: The scenario as run, YAML.
@@ -100,6 +102,8 @@ class RunReport:
     moments: Sequence[Moment]
     shown: Sequence[str]
     network: Sequence[Plot]
+    messages: Table | None
+    events: Table | None
     links: Table | None
     timing: Table | None
     scenario: str

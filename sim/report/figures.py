@@ -1,8 +1,9 @@
-"""The figures that only a report has: the world, paths from near, how far the nodes are from each other.
+"""The figures that only a report has: the world, paths from near, how far apart nodes are, who takes part.
 
 Imports matplotlib: what only runs scenarios does not import this module.
 """
 
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 
 import numpy as np
@@ -98,6 +99,42 @@ def plot_disagreement(results: Results) -> Figure:
     axes.set(xlabel="frame", ylabel=f"distance / {unit}", xlim=(0, results.scenario.frames - 1))
     axes.set_ylim(bottom=0)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    figure.legend(loc="outside lower center", ncols=2, frameon=False)
+    return figure
+
+
+def plot_members(results: Results, per_frame: Mapping[str, Sequence[int | None]]) -> Figure:
+    """How many members the nodes count in each frame: the most and the fewest over those that tell.
+
+    Args:
+        results: The run.
+        per_frame: What each node has counted in each frame, None where it told nothing.
+    """
+    counts = np.ma.masked_invalid(np.array(list(per_frame.values()), dtype=float))
+    figure = Figure(figsize=(WIDTH_IN, 2.9), layout="constrained")
+    axes = cleaned(figure.add_subplot())
+    frames, color = np.arange(counts.shape[1]), COLORS["dcpf"]
+    axes.step(
+        frames,
+        counts.max(axis=0),
+        where="mid",
+        color=color,
+        linewidth=1.6,
+        label="the most that a node counts",
+    )
+    axes.step(
+        frames,
+        counts.min(axis=0),
+        where="mid",
+        color=color,
+        linewidth=0.8,
+        linestyle="--",
+        label="the fewest",
+    )
+    axes.set(xlabel="frame", ylabel="members", xlim=(0, results.scenario.frames - 1))
+    axes.set_ylim(0, len(results.scenario.cameras) + 0.5)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     figure.legend(loc="outside lower center", ncols=2, frameon=False)
     return figure
 

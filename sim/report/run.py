@@ -13,9 +13,9 @@ from sim.assembly import Assembly
 from sim.pictures.convergence import plot_convergence
 from sim.pictures.plots import plot_errors
 from sim.report.elements import Plot, RunReport
-from sim.report.figures import WIDTH_IN, plot_disagreement, plot_heights, plot_paths, plot_world
+from sim.report.figures import WIDTH_IN, plot_disagreement, plot_heights, plot_members, plot_paths, plot_world
 from sim.report.retelling import filmed, told_again
-from sim.report.run_tables import figures_table, links_table, timing_table
+from sim.report.run_tables import events_table, figures_table, links_table, messages_table, timing_table
 from sim.report.stills import choose_moments, drawn_in, moments_of
 from sim.report.svg import inline
 from sim.results.convergence import converge
@@ -60,7 +60,9 @@ def run_report(
         places=_places(results, assembly),
         moments=moments_of(results, assembly, previews, why),
         shown=drawn_in(results),
-        network=_network(results, assembly),
+        network=_network(results, assembly, summary),
+        messages=messages_table(results, summary),
+        events=events_table(summary),
         links=links_table(results, assembly, summary),
         timing=timing_table(summary),
         scenario=scenario,
@@ -137,7 +139,7 @@ def _places(results: Results, assembly: Assembly) -> list[Plot]:
     return plots
 
 
-def _network(results: Results, assembly: Assembly) -> list[Plot]:
+def _network(results: Results, assembly: Assembly, summary: Mapping[str, Any]) -> list[Plot]:
     """How the nodes agree, in the run and by their algorithm; of one node there is nothing to say."""
     if len(results.of("dcpf")) < 2:
         return []
@@ -147,12 +149,16 @@ def _network(results: Results, assembly: Assembly) -> list[Plot]:
     convergence = plot_convergence(graph, found)
     convergence.set_size_inches(7.4, 3.4)
     apart = "How far the nodes' estimates are from each other"
+    members = plot_members(results, summary["members"]["per_frame"])
+    counted = "How many cameras take part, as the nodes count them"
     rounds = "How the rounds of a frame bring any values together"
+    start = "one start" if found[name].expected is None else "the worst start, against theory"
     return [
         Plot(inline(plot_disagreement(results), "disagreement", apart), f"{apart}, over the frames."),
+        Plot(inline(members, "members", counted), f"{counted}, over the frames."),
         Plot(
             inline(convergence, "rounds", rounds),
-            f"{rounds} on this graph: the worst start, against theory.",
+            f"{rounds} on this graph, over perfect links: {start}.",
             wide=True,
         ),
     ]

@@ -87,6 +87,43 @@ def links_table(results: Results, assembly: Assembly, summary: Mapping[str, Any]
     return Table("What each link carries in a frame", ("link", "what", "messages", "bytes"), rows, note)
 
 
+def messages_table(results: Results, summary: Mapping[str, Any]) -> Table | None:
+    """What became of the rounds' messages; None where there are none, or nobody has counted."""
+    if not (results.scenario.graph.edges and summary.get("sent_per_frame")):
+        return None
+    network = summary["network"]
+    fates = {
+        "lost": "lost: never arrived",
+        "late_messages": "late: arrived after their round",
+        "duplicated": "duplicated: arrived again",
+        "dropped": "dropped: arrived, and were of no use",
+        "refused": "refused: were not valid",
+    }
+    rows = [[words, f"{network[key]:,}"] for key, words in fates.items()]
+    note = (
+        f"Of {network['messages_per_frame']:,.4g} a frame, over all links and in both directions. Nodes that"
+        " died on the way have not told theirs."
+    )
+    return Table("What became of the messages of the rounds", ("messages", "how many"), rows, note)
+
+
+def events_table(summary: Mapping[str, Any]) -> Table | None:
+    """Who was lost, came back, or no longer looked where it should; None where nobody was."""
+    rows = [
+        [
+            event["node"],
+            f"knocked, for {event['frames']} frames" if event["event"] == "knocked" else event["event"],
+            str(event["frame"]),
+        ]
+        for event in summary["members"]["events"]
+    ]
+    note = (
+        "Lost: no other camera counts it any more; back: all do again; knocked: it looks elsewhere than in"
+        " the beginning."
+    )
+    return Table("Lost and back", ("camera", "what", "frame"), rows, note) if rows else None
+
+
 def timing_table(summary: Mapping[str, Any]) -> Table | None:
     """How long a run's steps took; None where nobody has timed them."""
     timing = summary.get("timing", {})

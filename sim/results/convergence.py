@@ -1,9 +1,11 @@
 """How averaging converges on a scenario's graph: the real rounds of every node, over the network in memory.
 
 The residual is the worst over all starts, ||X(t) - mean|| / ||X(0) - mean||: with a unit vector at every
-node, the values after t rounds are the rounds' matrix. Where thresholds decide what is sent there is no such
-matrix, and the residual is that of one start, drawn by the scenario's seed. Bytes are counted on that start
-too, with vectors as long as the scenario's fusion sends them.
+node, the values after t rounds are the rounds' matrix. Where thresholds decide what is sent, or numbers are
+rounded, there is no such matrix, and the residual is that of one start, drawn by the scenario's seed. Bytes
+are counted on that start too, with vectors as long as the scenario's fusion sends them.
+
+The links are perfect, whatever the scenario's conditions.
 """
 
 from collections.abc import Iterator, Mapping
@@ -19,7 +21,7 @@ from network.averaging import matrices
 from network.averaging.weights import ConsensusOptions
 from network.graphs.graph import Graph
 from network.graphs.laplacian import laplacian
-from network.graphs.spectrum import Spectrum, spectrum_of
+from network.graphs.spectrum import extremes_of, spectrum_of
 from network.links.memory import MemoryNetwork
 from network.links.transport import links_of
 from network.rounds.consensus import Consensus
@@ -28,6 +30,7 @@ from network.wire.messages import ConsensusMessage
 from network.wire.quantization import Quantizer
 from nodes.filtering.fusion import packed_size
 from sim.scenario.model import Scenario
+from sim.scenario.parsing import ScenarioError
 from sim.scenario.presets import PAPER
 
 ALGORITHMS = (
@@ -42,7 +45,7 @@ ALGORITHMS = (
 """All that a scenario can choose."""
 
 EXACT = 1e-11
-"""Residuals below are rounding."""
+"""Residuals below are rounding, where all bits are sent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,34 +73,43 @@ def converge(
     """Runs algorithms on a scenario's graph, one after the other.
 
     Args:
-        scenario: The scenario.
+        scenario: The scenario, of two cameras or more.
         algorithms: Their names. One that the scenario has chosen has its options, the others have the
             defaults; constant weights the paper's where they converge, 1 / (1 + largest degree) elsewhere.
         rounds: How many. None for the scenario's, or as many as finite-time averaging needs if it is one of
             them and these are more.
+
+    Raises:
+        ScenarioError: Finite-time averaging is one of them, and the graph is too large for it.
     """
     graph = scenario.graph
-    spectrum = spectrum_of(graph)
+    try:
+        # finite-time rounds are those of a whole run, also where not all of them are looked at
+        needed = len(spectrum_of(graph).eigenvalues) if "finite_time" in algorithms else 0
+    except ValueError as error:
+        raise ScenarioError(f"{scenario.name}: {error}") from error
     if rounds is None:
-        needed = len(spectrum.eigenvalues) if "finite_time" in algorithms else 0
         rounds = max(scenario.network.iterations, needed)
+    encoding = scenario.network.payload.encoding
+    rounding = max(EXACT, float(np.finfo(encoding).epsneg))
     for name in algorithms:
         options = _options(scenario, name)
-        # finite-time rounds are those of a whole run, also where not all of them are looked at
-        algorithm = options.tuned(graph, max(rounds, len(spectrum.eigenvalues)))
-        nodes = _nodes(scenario, algorithm, rounds)
-        units, _ = average(scenario.name, graph, nodes, np.eye(len(graph.names)))
+        algorithm = options.tuned(graph, max(rounds, needed))
         size = packed_size(2 * scenario.target.n_axes, scenario.fusion)
         values = np.array(
             [stream(scenario.seed, each, "consensus").normal(size=size) for each in graph.names]
         )
         drawn, sent = average(scenario.name, graph, _nodes(scenario, algorithm, rounds), values)
-        if name == "event_triggered":  # a threshold makes of unit vectors what it makes of nothing else
-            residual = np.array([matrices.residual(each, values) for each in drawn])
+        if name == "event_triggered" or encoding != "float64":
+            # what a threshold or rounding makes of unit vectors it makes of nothing else
+            residual, expected = np.array([matrices.residual(each, values) for each in drawn]), None
         else:
+            nodes = _nodes(scenario, algorithm, rounds)
+            units, _ = average(scenario.name, graph, nodes, np.eye(len(graph.names)))
             residual = np.array([matrices.worst_residual(each) for each in units])
-        theory, expected = _theory(options, graph, spectrum, rounds)
-        yield name, Convergence(residual[1:], expected, _rate(residual), theory, sent / max(rounds, 1))
+            expected = _expected(options, graph, rounds)
+        rate, theory = _rate(residual, rounding), _theory(options, graph)
+        yield name, Convergence(residual[1:], expected, rate, theory, sent / max(rounds, 1))
 
 
 def average(
@@ -152,35 +164,34 @@ def _options(scenario: Scenario, name: str) -> ConsensusOptions:
     return options
 
 
-def _theory(
-    options: ConsensusOptions, graph: Graph, spectrum: Spectrum, rounds: int
-) -> tuple[float, Float[np.ndarray, " T"] | None]:
-    """The rate, and the residual after each round, from the algorithm's matrices."""
-    L = laplacian(graph)
+def _theory(options: ConsensusOptions, graph: Graph) -> float:
+    """The rate, from the algorithm's matrices."""
     match options.algorithm:
         case "constant":
-            rate = matrices.linear_rate(L, options.epsilon)
-        case "metropolis" | "event_triggered":
-            rate = matrices.linear_rate(matrices.metropolis_laplacian(graph))
+            return matrices.linear_rate(laplacian(graph), options.epsilon)
+        case "metropolis" | "event_triggered":  # which follows it, down to the threshold's floor
+            return matrices.linear_rate(matrices.metropolis_laplacian(graph))
         case "best_constant":
-            rate = spectrum.contraction
+            return extremes_of(graph).contraction
         case "chebyshev":
-            rate = matrices.chebyshev_rate(spectrum)
+            return matrices.chebyshev_rate(extremes_of(graph))
         case "finite_time":
-            rate = 0.0
+            return 0.0
         case "ratio":
-            rate = matrices.ratio_rate(L)
-    if options.algorithm == "event_triggered":
-        return rate, None  # as Metropolis, down to the threshold's floor
+            return matrices.ratio_rate(laplacian(graph))
+
+
+def _expected(options: ConsensusOptions, graph: Graph, rounds: int) -> Float[np.ndarray, " T"]:
+    """The worst residual after each round, from the algorithm's matrices."""
     values = matrices.rounds(options, graph)(np.eye(len(graph.names)))
-    return rate, np.array([matrices.worst_residual(each) for each in islice(values, 1, rounds + 1)])
+    return np.array([matrices.worst_residual(each) for each in islice(values, 1, rounds + 1)])
 
 
-def _rate(residual: Float[np.ndarray, " T"]) -> float:
+def _rate(residual: Float[np.ndarray, " T"], rounding: float) -> float:
     """The mean factor over the second half of the rounds until the error is at its least, or rounding is."""
-    above = np.flatnonzero(residual > EXACT)
-    last = int(above[np.argmin(residual[above])])
-    if last + 1 < len(residual) and residual[last + 1] <= EXACT and residual[last] > np.sqrt(EXACT):
+    reached = np.flatnonzero(residual <= rounding)
+    last = int(np.argmin(residual[: reached[0] if reached.size else None]))
+    if reached.size and last + 1 == reached[0] and residual[last] > np.sqrt(rounding):
         return 0.0  # from far off to exact in one round
     first = last // 2
     return float((residual[last] / residual[first]) ** (1 / max(last - first, 1)))

@@ -13,15 +13,17 @@ def advice(scenario: Scenario) -> Iterator[str]:
         scenario: With a graph of names and edges.
     """
     network, lag, needed = scenario.network, scenario.lag_frames, scenario.needed_lag_frames
-    message_s = network.conditions.latest_round_s
-    if network.conditions.lose and network.consensus.algorithm != "ratio":
+    conditions, message_s = network.conditions, network.conditions.latest_round_s
+    cut = scenario.pace == "realtime" and lag < needed
+    if network.consensus.algorithm != "ratio" and (conditions.lose or (cut and conditions.vary)):
+        where = "on links that lose messages" if conditions.lose else "where jitter has rounds cut"
         yield (
             f"network.consensus is {network.consensus.algorithm}, whose average suffers from every message"
-            " that only one end of a link has: on links that lose messages, ratio does not"
+            f" that only one end of a link has in time: {where}, ratio does not"
         )
     if scenario.pace != "realtime" or not message_s:
         return
-    if lag < needed:
+    if cut:
         yield (
             f"network.lag_frames is {lag}, and {network.iterations} rounds of {message_s:g} s need {needed}:"
             " rounds will be cut; leave it out"

@@ -209,16 +209,16 @@ class Scenario(Options):
         return self
 
     def require_convergence(self) -> None:
-        """Checks that consensus converges on the graph.
+        """Checks that consensus converges on the graph, and that the conditions fit it.
 
         Raises:
-            ValueError: The graph falls into parts, or the averaging does not suit it.
+            ValueError: The graph falls into parts, or the averaging or the conditions do not suit it.
         """
         graph, network = self.graph, self.network
         graph.require_connected()
         network.consensus.require_convergence(graph.max_degree)
         network.consensus.tuned(graph, network.iterations)
-        network.conditions.require_links(graph.edges, graph.names)
+        network.conditions.require_possible(graph.edges, graph.names, self.frames)
 
     @property
     def graph(self) -> Graph:

@@ -150,3 +150,13 @@ def _require_closed_form(scenario: Scenario) -> None:
             f"{scenario.name}: network.payload.encoding is {scenario.network.payload.encoding}, and matrices"
             " round nothing: take float64"
         )
+    if not scenario.network.conditions.are_perfect:
+        raise ScenarioError(
+            f"{scenario.name}: network.conditions is set, and matrices lose and delay nothing: take it out,"
+            " or use dcpf run"
+        )
+    if scenario.faults:
+        raise ScenarioError(
+            f"{scenario.name}: faults is set, and nothing goes wrong with matrices: take it out, or use"
+            " dcpf run"
+        )

@@ -119,10 +119,17 @@ def test_parts_do_not_hear_each_other_from_frame_to_frame(source, target, parted
 def test_who_is_named_must_be_there():
     options = ConditionsOptions.model_validate({"links": [{"link": ["A", "C"]}], "partitions": [PARTED]})
     with pytest.raises(ValueError, match=r"links names A and C, between which the graph has no link"):
-        options.require_links([("A", "B")], "ABC")
+        options.require_possible([("A", "B")], "ABC", 9)
     with pytest.raises(ValueError, match=r"partitions names B, which is no camera: name some of A, C"):
-        options.require_links([("A", "C")], "AC")
-    options.require_links([("A", "C")], "ABC")
+        options.require_possible([("A", "C")], "AC", 9)
+    options.require_possible([("A", "C")], "ABC", 9)
+
+
+def test_a_partition_comes_about_before_the_run_ends():
+    options = ConditionsOptions.model_validate({"partitions": [{**PARTED, "first_frame": 8}]})
+    options.require_possible([], "ABC", 9)
+    with pytest.raises(ValueError, match=r"partitions has one from frame 8 on: the run ends with frame 7"):
+        options.require_possible([], "ABC", 8)
 
 
 def test_a_camera_is_in_one_part():

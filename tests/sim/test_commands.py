@@ -15,6 +15,7 @@ from sim.commands.app import app
 from sim.commands.inspect import scenario_schema
 from sim.running import listener
 
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
 BRIEF = ["--frames", "3", "--set", "filter.n_particles=10"]
 
 
@@ -89,6 +90,14 @@ MISTAKES = {
             "network.consensus.epsilon=0.34",
         ],
         "take it below 1/3 = 0.333",
+    ),
+    "nobody to average with": (
+        ["consensus", str(SCENARIOS / "wica.yaml")],
+        "wica has one camera, and nobody to average with",
+    ),
+    "no rounds": (
+        ["consensus", "small.yaml", "--set", "network.iterations=0"],
+        "network.iterations is 0, and nothing averages: give --rounds",
     ),
     "a negative seed": (["run", "small.yaml", "--seed", "-1"], "--seed"),
     "no command": (["frobnicate"], "No such command"),
@@ -169,6 +178,32 @@ def test_compare_writes_figures_and_plots(dcpf, small, tmp_path):
         *("comparison.json", "comparison.svg", "comparison.png", "cells.jsonl", "summary.csv", "timing.json"),
         *("parts", "report.html"),
     }
+
+
+def test_consensus_says_that_it_leaves_conditions_out(dcpf, small):
+    asked = ["consensus", small, "--algorithm", "metropolis", "--out", "out", "--json"]
+
+    perfect, lossy = dcpf(*asked), dcpf(*asked, "--set", "network.conditions.loss=0.3")
+
+    assert lossy.stdout == perfect.stdout
+    assert "conditions is left out" not in perfect.stderr
+    assert "conditions is left out: the algorithms are compared on perfect links" in lossy.stderr
+
+
+def test_consensus_takes_two_eigenvalues_where_there_are_many(dcpf, small, monkeypatch):
+    asked = ["consensus", small, "--graph", "path", "--out", "out", "--json"]
+    whole = json.loads(dcpf(*asked, "--algorithm", "chebyshev").stdout)
+    monkeypatch.setattr("network.graphs.spectrum.LARGEST_DENSE", 3)
+    monkeypatch.setattr("sim.commands.consensus.LARGEST_DENSE", 3)
+
+    two = json.loads(dcpf(*asked, "--algorithm", "chebyshev").stdout)
+    every = dcpf(*asked)
+
+    assert two["graph"]["eigenvalues"] == pytest.approx([whole["graph"]["eigenvalues"][i] for i in (0, -1)])
+    assert (whole["graph"]["has_all_eigenvalues"], two["graph"]["has_all_eigenvalues"]) == (True, False)
+    assert two["algorithms"]["chebyshev"]["rate"] == pytest.approx(whole["algorithms"]["chebyshev"]["rate"])
+    assert every.exit_code == 2
+    assert "all eigenvalues of 4 nodes, more than 3, take too long: choose an algorithm" in every.stderr
 
 
 def test_nobody_who_reads_the_output_is_no_failure():

@@ -11,7 +11,7 @@ from network.graphs import graph
 from network.rounds.consensus import Consensus
 from network.wire.messages import EstimateMessage
 from sim.pictures.convergence import plot_convergence
-from sim.results.convergence import ALGORITHMS, average, converge
+from sim.results.convergence import ALGORITHMS, EXACT, average, converge
 from sim.scenario.loading import load_scenario
 
 
@@ -39,6 +39,26 @@ def test_finite_time_has_the_rounds_that_it_needs(small):
     assert len(found(small, path, ("network.iterations", "1"), algorithms=("ratio",))["ratio"].residual) == 1
     # those of a whole run, of which one is looked at
     assert found(small, path, algorithms=("finite_time",), rounds=1)["finite_time"].residual[0] > 0.1
+
+
+@pytest.mark.parametrize(("encoding", "unit"), [("float16", 2.0**-11), ("float32", 2.0**-24)])
+@pytest.mark.parametrize("shape", ["ring", "path"])
+def test_rounded_payloads_converge_as_theory_down_to_their_rounding(small, shape, encoding, unit):
+    """On unit vectors of a ring, whose numbers are powers of two, float16 rounds nothing: of no others."""
+    rounded = found(
+        small,
+        ("network.graph", shape),
+        ("network.payload.encoding", encoding),
+        algorithms=("metropolis", "best_constant", "chebyshev", "finite_time"),
+        rounds=120,
+    )
+    for name, each in rounded.items():
+        assert each.expected is None
+        assert EXACT < each.residual[-1] < 4 * unit
+        if name == "finite_time":
+            assert each.rate < 0.1
+        else:
+            assert each.rate == pytest.approx(each.theory, rel=0.05)
 
 
 def test_bytes_are_counted_on_the_scenarios_own_vectors(small):
@@ -95,6 +115,13 @@ def test_the_figure_tells_of_every_algorithm(small):
     # what is exact lies on the axis' foot
     assert marks[ALGORITHMS.index("finite_time")].get_ydata()[-1] == low
     assert [text.get_text() for text in axes.texts] == ["exact"]
+
+
+def test_the_figure_calls_nothing_exact_that_was_rounded(small):
+    (axes,) = plot_convergence("ring", found(small, ("network.payload.encoding", "float16"))).axes
+    assert not axes.texts
+    labels = axes.get_legend_handles_labels()[1][:-1]
+    assert all(label.splitlines()[0].endswith(", one start") for label in labels)
 
 
 def test_there_is_no_figure_of_nothing():

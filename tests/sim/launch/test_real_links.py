@@ -1,4 +1,4 @@
-"""A run over real links that are cut and that lose: one camera in a network namespace of its own.
+"""A run over real links that are cut, lose and delay: one camera in a network namespace of its own.
 
 The other nodes and the launcher are in a second one; a pair of virtual interfaces joins the two. What the
 kernel does to packets is real. Everything that is made here is removed afterwards.
@@ -17,6 +17,7 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(90)]
 
 HERE, THERE = "10.77.213.1", "10.77.213.2"
 FRAMES = 60
+DELAY_S = 0.05
 DOWN_S = 1.5
 """Longer than it takes to notice (a lease of 1 s), shorter than a node may be away (5 s)."""
 
@@ -69,6 +70,17 @@ def drop(name, protocol, per_mille):
         command(*inside(name), "nft", "add", "rule", "ip", "lossy", hook, *lose)
 
 
+def delay(name):
+    """Lets all that a namespace sends travel for `DELAY_S` longer."""
+    if shutil.which("tc") is None:
+        pytest.skip("needs tc (iproute2), to delay packets")
+    try:
+        netem = ("netem", "delay", f"{1000 * DELAY_S:.0f}ms")
+        command(*inside(name), "tc", "qdisc", "add", "dev", "link0", "root", *netem)
+    except subprocess.CalledProcessError as error:
+        pytest.skip(f"this kernel has no netem, to delay packets: {error.stderr.decode().strip()}")
+
+
 def start(launched, dcpf, small, apart, protocol, *more):
     """A run of which camera B is in the namespace `one`."""
     hosts = {"A": HERE, "B": THERE, "C": HERE, "D": HERE}
@@ -119,6 +131,21 @@ def test_links_over_tcp_stall_and_lose_nothing(launched, dcpf, small, apart):
     summary = json.loads(stdout)
     assert summary["network"]["lost"] == 0
     assert all(len(frames) == FRAMES for frames in frames_told(launched).values())
+
+
+def test_links_that_take_their_time_are_waited_for_round_by_round(launched, dcpf, small, apart):
+    for name in (apart.one, apart.most):
+        delay(name)
+    start(launched, dcpf, small, apart, "tcp", "pace=lockstep")
+
+    code, stdout, stderr = launched.end(80)
+
+    assert code == 0, stderr
+    summary = json.loads(stdout)
+    assert summary["network"]["lost"] == summary["network"]["late_messages"] == 0
+    assert all(len(frames) == FRAMES for frames in frames_told(launched).values())
+    # each of the three rounds of a frame waits for what B and its neighbours tell each other
+    assert summary["timing"]["frames_per_s"] < 1 / (3 * DELAY_S)
 
 
 def test_a_link_that_is_down_parts_the_network_and_nobody_waits_for_the_other_side(

@@ -13,12 +13,14 @@ from sim.assembly import Assembly
 from sim.pictures.ground import ellipse
 from sim.pictures.theme import PARTICLE
 from sim.report import stills
+from sim.report.figures import plot_members
 from sim.report.retelling import told_again
 from sim.report.stills import choose_moments, moments_of
 from sim.results.recorder import read_run
 from sim.results.results import Results
 from sim.world.colors import bgr
 
+HTML = "{http://www.w3.org/1999/xhtml}"
 HOSTILE = "<script>alert('1')</script> & \"<img src=x onerror=alert(1)>"
 
 
@@ -55,6 +57,49 @@ def test_a_report_says_what_the_folder_says(dcpf, ran, small, page):
     # a picture of each camera at each moment
     assert len(read.all("img")) == 4 * len(read.all("h3")) > 0
     assert "n_particles: 40" in read.text("pre")
+
+
+BAD_LINKS = ("--set", "network.conditions={loss: 0.2, duplicates: 0.3}")
+HANG = ("--set", "faults=[{kind: hang, node: B, frame: 3, frames: 3}]")
+
+
+def test_a_report_tells_of_messages_and_members(dcpf, ran, small, page):
+    folder = ran(small, *BAD_LINKS, *HANG, "--set", "frames=10")
+    summary = json.loads((folder / "summary.json").read_text())
+    assert dcpf("report", folder).exit_code == 0
+
+    read = page(folder / "report.html")
+
+    network = summary["network"]
+    assert min(network["lost"], network["duplicated"]) > 0
+    fates = read.rows("What became of the messages")
+    assert {words.partition(":")[0]: int(count) for words, (count,) in list(fates.items())[1:]} == {
+        "lost": network["lost"],
+        "late": network["late_messages"],
+        "duplicated": network["duplicated"],
+        "dropped": network["dropped"],
+        "refused": network["refused"],
+    }
+    (frames,) = [table for table in read.all("table") if "Lost and back" in "".join(table.itertext())]
+    words = [["".join(cell.itertext()) for cell in row] for row in list(frames.iter(f"{HTML}tr"))[1:]]
+    assert words == [
+        [each["node"], each["event"], str(each["frame"])] for each in summary["members"]["events"]
+    ]
+    assert [each[:2] for each in words] == [["B", "lost"], ["B", "back"]]
+    assert "How many cameras take part" in read.text()
+
+
+def test_members_are_drawn_as_they_were_counted(ran, small):
+    folder = ran(small, *HANG, "--set", "frames=10")
+    results, summary = read_run(folder), json.loads((folder / "summary.json").read_text())
+    (axes,) = plot_members(results, summary["members"]["per_frame"]).axes
+    most, fewest = (line.get_ydata() for line in axes.get_lines())
+    told = summary["members"]["per_frame"]
+    for frame in range(10):
+        counts = [each[frame] for each in told.values() if each[frame] is not None]
+        assert (most[frame], fewest[frame]) == (max(counts), min(counts))
+    assert min(fewest) == 3
+    assert most[-1] == 4
 
 
 def test_the_same_run_gives_the_same_page(dcpf, ran, small, tmp_path):

@@ -164,6 +164,9 @@ def test_the_summary_is_what_the_frames_say():
         (("network.consensus.algorithm", "event_triggered"), "no matrix does: choose another"),
         (("network.payload.encoding", "float32"), "round nothing: take float64"),
         (("filter.dynamics.model", "autoregressive"), "take constant_velocity"),
+        (("network.conditions.loss", "0.3"), "conditions is set, and matrices lose and delay nothing: take"),
+        (("network.conditions.partitions", "[{groups: [[C1]], first_frame: 4, frames: 2}]"), "take it out"),
+        (("faults", "[{kind: kill, node: C1, frame: 4}]"), "faults is set, and nothing goes wrong with"),
     ],
 )
 def test_what_has_no_closed_form_is_refused(override, says):
