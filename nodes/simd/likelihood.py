@@ -65,7 +65,7 @@ class SimdLikelihood:
         report: What the last measurement has cost, in a frame.
 
     Raises:
-        ValueError: The sampling has no grid.
+        ValueError: The sampling has no grid, or a word is too short for its counts or for the colours.
     """
 
     def __init__(
@@ -79,6 +79,23 @@ class SimdLikelihood:
         self._kernel, (n_columns, self._n_rows) = sampling.kernel, sampling.grid
         self._columns = sample_positions(n_columns, sampling.kernel, 1.0)
         self._rows = sample_positions(self._n_rows, sampling.kernel, 0.5)
+        self._require_long_words(color)
+
+    def _require_long_words(self, color: ColorOptions) -> None:
+        """Counts, and the numbers of colours, must not wrap."""
+        most = (1 << self.options.bits) - 1
+        parts = rows_of_parts(self._n_rows, self._kernel, color.parts)
+        n_samples = len(self._columns) * max(part.stop - part.start for part in parts)
+        if n_samples > most:
+            raise ValueError(
+                f"sampling.grid is [{len(self._columns)}, {self._n_rows}], which has {n_samples:,} samples in"
+                f" one part of the box, and a word of {self.options.bits} bits counts to {most:,}: take fewer"
+            )
+        if color.n_bins > most:
+            raise ValueError(
+                f"color.bins_per_channel is {color.bins_per_channel}, which makes {color.n_bins:,} bins, and"
+                f" a word of {self.options.bits} bits counts to {most:,}: take fewer"
+            )
 
     def measure(
         self,

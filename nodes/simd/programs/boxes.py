@@ -226,9 +226,10 @@ def add_part(
 def normalize_part(array: ProcessorArray, coefficient: Word, pixels: Word, n_samples: int) -> None:
     """Multiplies the coefficient by √(samples / samples seen): from shares of the grid to shares of the seen.
 
-    The root has four bits before the point: it saturates where less than 1/256 of the part is in the picture.
+    The root has four bits before the point, or as many as that of all samples needs.
     """
-    n_words, point = array.options.number_words, array.options.number_bits - 4
+    before_point = max(4, -(-n_samples.bit_length() // 2))
+    n_words, point = array.options.number_words, array.options.number_bits - before_point
     ratio, root, divisor = array.number(n_words=2 * n_words), array.number(), array.number(n_words=1)
     with array.using(ratio, root, divisor):
         array.maximum(divisor, pixels, 1)
