@@ -5,6 +5,7 @@ import pytest
 
 from nodes.counting.histogram import SamplingOptions, count
 from nodes.simd.likelihood import SimdLikelihood
+from nodes.simd.memory import LineMemoryError
 from nodes.simd.options import SimdOptions
 from nodes.vision.appearance import Appearance
 from nodes.vision.color import ColorOptions
@@ -89,6 +90,16 @@ def test_fewer_words_read_the_samples_more_often(color):
     assert small.n_words <= 30
     reads = [sum(cost.external_reads for cost in each.costs.values()) for each in (report, small)]
     assert reads[0] <= reads[1]
+
+
+@EVERY_COLOUR
+@pytest.mark.parametrize(("arithmetic", "least"), [("fixed10", 21), ("fixed20", 28)])
+def test_as_many_words_as_one_colour_takes_are_enough(color, arithmetic, least):
+    enough, *_ = measured(color, 1, words=least, arithmetic=arithmetic)
+    many, *_ = measured(color, 1, words=120, arithmetic=arithmetic)
+    np.testing.assert_array_equal(enough.squared_distance, many.squared_distance)
+    with pytest.raises(LineMemoryError, match=r"give it more \(simd.words\)"):
+        SimdLikelihood(SimdOptions(words=least - 1, arithmetic=arithmetic), color, SamplingOptions())
 
 
 def test_all_at_once_is_as_one_by_one():
