@@ -13,7 +13,6 @@ from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.motion import DynamicsOptions
 from nodes.filtering.sighting import Sighting, shrinkage
 from nodes.setup import TrackingSetup
-from nodes.simd.memory import LineMemoryError
 from nodes.simd.programs.binning import BinningOptions
 from nodes.simd.report import FrameReport
 from nodes.simd.tracker import SimdTracker
@@ -36,10 +35,7 @@ class ArrayEstimator:
             ValueError: The array cannot do what the options ask for; the text says which and what to do.
         """
         self._node, self._setup = node, setup
-        try:
-            self._tracker = SimdTracker(_tracker_options(setup), setup.stream(node, "array"))
-        except LineMemoryError as error:
-            raise ValueError(f"filter.simd.words is {setup.filter.simd.words}: {error}") from error
+        self._tracker = SimdTracker(_tracker_options(setup), setup.stream(node, "array"))
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
         self._before = setup.start.moments
@@ -57,7 +53,7 @@ class ArrayEstimator:
             appearance: What the target looks like, to tell whether the estimate shows it.
 
         Raises:
-            ValueError: The picture is wider than the array.
+            ValueError: The array cannot begin with this picture, or with the target at that place.
         """
         self._appearance = appearance
         self._tracker.begin(picture.image, self._before.mean[:2])

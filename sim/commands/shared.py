@@ -53,17 +53,20 @@ def read_scenario(
     chosen = [(key, str(value)) for key, value in given.items() if value is not None]
     scenario = load_scenario(path, [*split_overrides(overrides), *chosen], rendered=rendered)
     if rendered:
-        _require_backend(scenario)
+        require_backend(scenario)
         _say_of_threads(scenario.filter)
     return scenario
 
 
-def _require_backend(scenario: Scenario) -> None:
+def require_backend(scenario: Scenario) -> None:
     """Fails before anything starts where this machine, or the emulated one, cannot run the filter."""
     if scenario.filter.backend != "fast":
         from sim.assembly import Assembly
 
-        Assembly(scenario).require_backend()
+        assembly = Assembly(scenario)
+        assembly.require_backend()
+        if scenario.filter.backend == "simd":
+            assembly.try_array()
 
 
 def _say_of_threads(options: FilterOptions) -> None:

@@ -16,6 +16,48 @@ FRACTION_BITS = 4
 """A and B are in sixteenths."""
 
 
+def coefficients_of(process: tuple[float, float], bits: int) -> tuple[int, int]:
+    """A and B as the array holds them.
+
+    Args:
+        process: A and B.
+        bits: Of a word.
+
+    Raises:
+        ValueError: They are no sixteenths, or so large that A x + B x' could leave its two words.
+    """
+    unit = 1 << FRACTION_BITS
+    most = (1 << bits - 1) - 1
+    A, B = (round(weight * unit) for weight in process)
+    if (A / unit, B / unit) != process or abs(A) + abs(B) > most:
+        raise ValueError(
+            f"A is {process[0]:g} and B is {process[1]:g}: the array holds sixteenths, which add up to"
+            f" {most / unit:g} at most without their signs; the nearest are {A / unit:g} and {B / unit:g}"
+        )
+    return A, B
+
+
+def deviation_of(noise_px: float, fraction_bits: int, bits: int) -> int:
+    """The noise's standard deviation as the array holds it, to the nearest unit of the state.
+
+    Args:
+        noise_px: The standard deviation in pixels.
+        fraction_bits: Bits of the state after the point.
+        bits: Of a word.
+
+    Raises:
+        ValueError: It is less than a unit, or does not fit a word.
+    """
+    unit, most = 1 << fraction_bits, (1 << bits) - 1
+    held = round(noise_px * unit)
+    if not 1 <= held <= most:
+        raise ValueError(
+            f"the motion's noise has a standard deviation of {noise_px:g} pixels, and the array holds"
+            f" {1 / unit:g} to {most / unit:g} (noise_px, the root of filter.dynamics.position_variance)"
+        )
+    return held
+
+
 def xorshift(array: ProcessorArray, state: Word) -> None:
     """The next state of a xorshift generator (Marsaglia 2003) of two words, whose period is 2²ᵇ - 1."""
     first, second, third = XORSHIFTS[array.options.bits]
@@ -58,7 +100,7 @@ def predict(
     now: Word,
     before: Word,
     generator: Word,
-    process: tuple[float, float],
+    coefficients: tuple[int, int],
     standard_deviation: int,
     limits: tuple[int, int],
 ) -> None:
@@ -69,11 +111,10 @@ def predict(
         now: x(t), which becomes x(t+1).
         before: x(t-1), which becomes x(t).
         generator: Of the elements' noise.
-        process: A and B.
+        coefficients: A and B in sixteenths.
         standard_deviation: σ in units of the state.
         limits: The least and greatest coordinate; beyond them it saturates.
     """
-    coefficients = [round(coefficient * (1 << FRACTION_BITS)) for coefficient in process]
     with array.using(array.number(n_words=2, signed=True)) as (noise,):
         gaussian(array, noise, generator, standard_deviation)
         mean, term = array.number(n_words=2, signed=True), array.number(n_words=2, signed=True)
