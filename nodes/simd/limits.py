@@ -36,7 +36,7 @@ def require_room(options: TrackerOptions, counted: Region) -> None:
 
 
 def require_fitting(
-    options: TrackerOptions, width: int, height: int, positions: Sequence[Float[np.ndarray, " 2"]]
+    options: TrackerOptions, width: int, height: int, positions: Sequence[Float[np.ndarray, " _"]]
 ) -> None:
     """Makes sure that a picture fits the array, and the targets the picture.
 
@@ -44,7 +44,7 @@ def require_fitting(
         options: The tracker.
         width: Of the picture.
         height: Of the picture.
-        positions: Centres of the targets.
+        positions: Centres of the targets, x and y first.
 
     Raises:
         ValueError: They do not; the text says what to do.
@@ -66,8 +66,9 @@ def require_fitting(
     if len(positions) != len(options.n_particles):
         raise ValueError(f"{len(positions)} positions for {len(options.n_particles)} targets")
     for position in positions:
-        if not ((position >= 0) & (position < (width, height))).all():
+        x, y = position[:2]
+        if not (0 <= x < width and 0 <= y < height):
             raise ValueError(
-                f"a target starts at {np.round(position, 1).tolist()}, outside of the picture of"
+                f"a target starts at [{x:.1f}, {y:.1f}], outside of the picture of"
                 f" {width} x {height} pixels: start inside"
             )

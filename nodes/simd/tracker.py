@@ -92,13 +92,14 @@ class SimdTracker:
         self._targets: list[Target] = []
 
     def begin(
-        self, image: UInt8[np.ndarray, "H W 3"], *positions: Float[np.ndarray, " 2"]
+        self, image: UInt8[np.ndarray, "H W 3"], *positions: Float[np.ndarray, " _"]
     ) -> Float[np.ndarray, "G 2"]:
         """Takes the references from the first picture.
 
         Args:
             image: Blue, green, red; not wider than the array.
-            positions: x and y of each target's centre, in pixels.
+            positions: x and y of each target's centre, in pixels, and those of the frame before where they
+                differ.
 
         Returns:
             The positions.
@@ -115,7 +116,8 @@ class SimdTracker:
         self._deviation = deviation_of(self.options.noise_px, self._fraction_bits, self.options.simd.bits)
         self._bin(image)
         for group, position in zip(self._groups, positions, strict=True):
-            for word, coordinate in zip(self._state, np.tile(position, 2), strict=True):
+            before = np.clip(position[-2:], 0, (width - 1, height - 1))
+            for word, coordinate in zip(self._state, np.r_[position[:2], before], strict=True):
                 lanes = word.value.copy()
                 lanes[group.elements] = round(float(coordinate) * (1 << self._fraction_bits))
                 self.array.input(word, lanes)
@@ -127,7 +129,7 @@ class SimdTracker:
             Target(group, reference(of_group, self._region.total, self.options.simd))
             for group, of_group in zip(self._groups, counts, strict=True)
         ]
-        return np.stack(positions)
+        return np.stack([position[:2] for position in positions])
 
     def step(self, image: UInt8[np.ndarray, "H W 3"]) -> Float[np.ndarray, "G 2"]:
         """One frame.

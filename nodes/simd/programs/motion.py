@@ -14,6 +14,8 @@ XORSHIFTS = MappingProxyType({8: (7, 9, 8), 9: (3, 7, 4), 10: (7, 3, 9), 11: (7,
 """For words of so many bits three shifts that give a generator of two words its full period."""
 FRACTION_BITS = 4
 """A and B are in sixteenths."""
+ROUNDING = 0.1
+"""Part of its standard deviation by which rounding may change the noise."""
 
 
 def coefficients_of(process: tuple[float, float], bits: int) -> tuple[int, int]:
@@ -46,14 +48,15 @@ def deviation_of(noise_px: float, fraction_bits: int, bits: int) -> int:
         bits: Of a word.
 
     Raises:
-        ValueError: It is less than a unit, or does not fit a word.
+        ValueError: It does not fit a word, or rounding would make it another.
     """
     unit, most = 1 << fraction_bits, (1 << bits) - 1
-    held = round(noise_px * unit)
-    if not 1 <= held <= most:
+    held = min(max(round(noise_px * unit), 1), most)
+    if abs(held / unit - noise_px) > ROUNDING * noise_px:
         raise ValueError(
             f"the motion's noise has a standard deviation of {noise_px:g} pixels, and the array holds"
-            f" {1 / unit:g} to {most / unit:g} (noise_px, the root of filter.dynamics.position_variance)"
+            f" {1 / unit:g}, {2 / unit:g}, … to {most / unit:g}: the nearest is {held / unit:g} (noise_px, or"
+            " the root of filter.dynamics.position_variance)"
         )
     return held
 
