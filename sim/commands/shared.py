@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from nodes.setup import FilterOptions
-from nodes.threads import n_shares
+from nodes.threads import n_cores, n_shares
 from nodes.vision.observation import LEAST_BOXES
 from sim.scenario.advice import advice
 from sim.scenario.loading import load_scenario
@@ -74,9 +74,10 @@ def _say_of_threads(options: FilterOptions) -> None:
     n, wanted = options.n_particles, options.threads
     used = n_shares(n, wanted, LEAST_BOXES)
     if used < wanted:
+        few = f"fewer than {LEAST_BOXES:,} particles a thread would lose time, and there are {n:,}"
+        reason = few if n // LEAST_BOXES < n_cores() else "this process may use no more cores"
         Console(stderr=True).print(
-            f"filter.threads is {wanted}, and {used} will be used: fewer than {LEAST_BOXES:,} particles"
-            f" a thread would lose time, and there are {n:,}",
+            f"filter.threads is {wanted}, and {used} will be used: {reason}",
             highlight=False,
             soft_wrap=True,
         )
