@@ -17,6 +17,7 @@ from sim.scenario.presets import (
     ONE_CAMERA_PAPER,
     ONE_CAMERA_ROBUST,
     PAPER,
+    PAPER_ON_ARRAY,
     PERSON_PARTS,
     ROBUST,
 )
@@ -60,6 +61,7 @@ def preset_reference() -> str:
         ("both, in the image plane", dict(_flat(ONE_CAMERA))),
         ("`paper`, in the image plane", dict(_flat(ONE_CAMERA_PAPER))),
         ("`robust`, in the image plane", dict(_flat(ONE_CAMERA_ROBUST))),
+        ("`paper`, with `filter.backend` `simd`", dict(_flat(PAPER_ON_ARRAY))),
         ("`robust`, of a person on a plane", dict(_flat(PERSON_PARTS))),
         ("`robust`, where links lose messages", dict(_flat(LOSSY))),
     ]

@@ -74,7 +74,10 @@ class SimdLikelihood:
         self, options: SimdOptions, color: ColorOptions, sampling: SamplingOptions, *, batching: bool = True
     ) -> None:
         if sampling.grid is None:
-            raise ValueError("sampling.grid is null, and the array reads a fixed grid: give columns and rows")
+            raise ValueError(
+                "sampling.grid is null, and the array reads a fixed grid: give columns and rows, or take"
+                " filter.backend: fast"
+            )
         self.options = options
         self.report: FrameReport | None = None
         self._color, self._batching = color, batching

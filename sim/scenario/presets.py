@@ -60,6 +60,10 @@ every frame."""
 ONE_CAMERA_ROBUST: Mapping[str, Any] = {"fusion": {"rule": "net_information"}}
 """A camera that nobody helps stays nearer to its particles by their moments than by a quadratic."""
 
+PAPER_ON_ARRAY: Mapping[str, Any] = {"filter": {"sampling": {"grid": [15, 15]}}}
+"""What the paper preset reads of a box where the emulated array counts: a machine of fixed cycles cannot read
+boxes of any size."""
+
 LOSSY: Mapping[str, Any] = {"network": {"consensus": {"algorithm": "ratio"}}}
 """What the robust preset averages with where links lose messages."""
 
@@ -90,6 +94,8 @@ def preset_defaults(data: Mapping[str, Any]) -> Mapping[str, Any]:
         defaults = _merged(defaults, ONE_CAMERA_PAPER if name == "paper" else ONE_CAMERA_ROBUST)
     elif name == "robust" and _is_person(target):
         defaults = _merged(defaults, PERSON_PARTS)
+    if name == "paper" and _on_array(data.get("filter")):
+        defaults = _merged(defaults, PAPER_ON_ARRAY)
     network = data.get("network")
     if name != "paper" and isinstance(network, Mapping) and _loses(network.get("conditions")):
         defaults = _merged(defaults, LOSSY)
@@ -98,6 +104,11 @@ def preset_defaults(data: Mapping[str, Any]) -> Mapping[str, Any]:
         # Another algorithm has other options: the file's own choice stands by itself.
         defaults = {**defaults, "network": {**defaults.get("network", {}), "consensus": {}}}
     return defaults
+
+
+def _on_array(filter_options: Any) -> bool:
+    """Whether the emulated array counts the colours."""
+    return isinstance(filter_options, Mapping) and filter_options.get("backend") == "simd"
 
 
 def _loses(conditions: Any) -> bool:

@@ -4,7 +4,7 @@ import pytest
 
 from network.averaging.weights import ConstantWeights, MetropolisWeights
 from sim.scenario.loading import load_scenario
-from sim.scenario.presets import ONE_CAMERA, PAPER, PERSON_PARTS, ROBUST, preset_defaults
+from sim.scenario.presets import ONE_CAMERA, PAPER, PAPER_ON_ARRAY, PERSON_PARTS, ROBUST, preset_defaults
 
 CONSTANT = ("network.consensus", "{algorithm: constant, epsilon: 0.2}")
 
@@ -63,6 +63,18 @@ def test_only_a_person_has_head_torso_and_legs():
     assert preset_defaults({"preset": "paper"}) == PAPER
 
 
+def test_the_paper_preset_counts_every_pixel_but_on_the_array(small):
+    paper, on_array = ("preset", "paper"), ("filter.backend", "simd")
+
+    def grid(*overrides):
+        return load_scenario(small, overrides).filter.sampling.grid
+
+    assert grid(paper) is None
+    assert grid(paper, on_array) == tuple(PAPER_ON_ARRAY["filter"]["sampling"]["grid"])
+    assert grid(paper, on_array, ("filter.sampling.grid", "[7, 9]")) == (7, 9)
+    assert grid(on_array) == grid()
+
+
 @pytest.mark.parametrize("preset", ["paper", "robust"])
 def test_in_the_image_plane_both_presets_begin_with_pixels_and_a_person_is_one_part(preset):
     data = {"preset": preset, "target": {"space": "image"}}
@@ -77,7 +89,16 @@ def test_in_the_image_plane_both_presets_begin_with_pixels_and_a_person_is_one_p
     assert literal == (filled["filter"].get("resampling") == {"threshold": 1.0}) == (preset == "paper")
 
 
-@pytest.mark.parametrize("broken", [{"preset": 3}, {"preset": "none"}, {"target": []}, {"network": "ring"}])
+@pytest.mark.parametrize(
+    "broken",
+    [
+        {"preset": 3},
+        {"preset": "none"},
+        {"target": []},
+        {"network": "ring"},
+        {"preset": "paper", "filter": 3},
+    ],
+)
 def test_a_broken_scenario_is_left_to_the_model_to_judge(broken):
     assert isinstance(preset_defaults(broken), dict)
 

@@ -42,6 +42,13 @@ def test_it_loads_under_its_files_name(scenario):
     assert load_scenario(scenario).name == scenario.stem
 
 
+def test_several_cameras_run_on_their_arrays(scenario, summary_of):
+    shipped = load_scenario(scenario)
+    if len(shipped.cameras) > 1:
+        assert shipped.filter.backend == "simd"
+        assert "simd" in summary_of(scenario, *BRIEF)
+
+
 def test_it_repeats_from_its_seed_and_not_from_another(scenario):
     first = _estimates(scenario)
 

@@ -148,6 +148,7 @@ def test_shipped_experiments_are_planned(path):
 
     assert plan.options.name == path.stem
     assert {group.study for group in plan.groups} == set(plan.options.studies)
+    assert {group.scenario_run.filter.backend for group in plan.groups} == {"fast"}
     assert json.dumps(plan.options.model_dump(mode="json"))
 
 
