@@ -10,9 +10,16 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 
 
+@lru_cache(maxsize=1)
+def n_cores() -> int:
+    """Cores that this process may use."""
+    # not every system can tell which
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def n_shares(n: int, n_threads: int, least: int) -> int:
-    """Threads that n particles keep busy: no more than `n_threads`, each with `least` or more."""
-    return max(1, min(n_threads, n // least))
+    """Threads that n particles keep busy: no more than `n_threads` or cores, each with `least` or more."""
+    return max(1, min(n_threads, n_cores(), n // least))
 
 
 def in_shares(work: Callable[[slice], object], n: int, n_threads: int, least: int) -> None:

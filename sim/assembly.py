@@ -1,6 +1,7 @@
 """Puts a run together: from a resolved scenario to the nodes, their pictures and the truth."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -111,6 +112,30 @@ class Assembly:
             first = self.scenario.cameras[0].name
             _ = self.model_on_camera(first), self.single(first)
 
+    def try_array(self) -> None:
+        """Takes a frame on the emulated array, if the whole tracker runs there: the picture must fit it too.
+
+        Raises:
+            ScenarioError: The array cannot follow the target from where it starts.
+            SourceError: The camera's video cannot be read.
+        """
+        camera = self.scenario.cameras[0].name
+        single = self.single(camera)
+        if isinstance(single, ArrayEstimator):
+            model = self.model(camera)
+            with closing(self.source(camera)) as source:
+                picture = model.look(source.read(0))
+            with self._array_errors():
+                single.begin(picture, None)
+                single.step(1, {camera: (model, picture)})
+
+    @contextmanager
+    def _array_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except ValueError as error:
+            raise ScenarioError(f"{self.scenario.name}: filter.backend is simd, but {error}") from error
+
     @cached_property
     def world(self) -> World | None:
         """The rendered world, if it is one."""
@@ -193,10 +218,8 @@ class Assembly:
         model, options = self.model(camera), self.scenario.filter
         if options.backend != "simd":
             return model
-        try:
+        with self._array_errors():
             return replace(model, processor=SimdLikelihood(options.simd, options.color, options.sampling))
-        except ValueError as error:
-            raise ScenarioError(f"{self.scenario.name}: filter.backend is simd, but {error}") from error
 
     def single(self, camera: str) -> SirEstimator | ArrayEstimator | None:
         """A camera's filter on its own, if it is asked for; in the image plane wholly on its processor.
@@ -208,10 +231,8 @@ class Assembly:
             return None
         if self.scenario.filter.backend != "simd" or self.scenario.target.space != "image":
             return SirEstimator(camera, "single", self.setup)
-        try:
+        with self._array_errors():
             return ArrayEstimator(camera, self.setup)
-        except ValueError as error:
-            raise ScenarioError(f"{self.scenario.name}: filter.backend is simd, but {error}") from error
 
     def smart_camera(self, name: str) -> SmartCamera:
         """A camera's node."""

@@ -5,6 +5,9 @@ the array too, and not the likelihood alone.
 """
 
 from collections.abc import Mapping
+from operator import attrgetter
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -12,14 +15,31 @@ from network.wire.messages import EstimateMessage
 from nodes.filtering.gaussian import Moments, moments
 from nodes.filtering.motion import DynamicsOptions
 from nodes.filtering.sighting import Sighting, shrinkage
-from nodes.setup import TrackingSetup
-from nodes.simd.memory import LineMemoryError
-from nodes.simd.programs.binning import BinningOptions
+from nodes.setup import FilterOptions, TrackingSetup
+from nodes.simd.programs.binning import MAX_BINS, BinningOptions
 from nodes.simd.report import FrameReport
 from nodes.simd.tracker import SimdTracker
 from nodes.simd.tracker_options import TrackerOptions
 from nodes.vision.appearance import Appearance
 from nodes.vision.observation import ObservationModel, Picture
+
+FIXED: Mapping[str, Any] = MappingProxyType(
+    {
+        "color.parts": (1.0,),
+        "color.background_weighting": False,
+        "color.gain_correction": False,
+        "likelihood.form": "literal",
+        "likelihood.calibration": "fixed",
+        "model_update.alpha": 0.0,
+        "resampling.threshold": 1.0,
+    }
+)
+"""Options of the filter whose value the paper's tracker has once and for all."""
+
+
+def not_on_array(options: FilterOptions) -> dict[str, Any]:
+    """What a filter asks for and the array's tracker does otherwise: the options, with what it does."""
+    return {key: fixed for key, fixed in FIXED.items() if attrgetter(key)(options) != fixed}
 
 
 class ArrayEstimator:
@@ -36,10 +56,7 @@ class ArrayEstimator:
             ValueError: The array cannot do what the options ask for; the text says which and what to do.
         """
         self._node, self._setup = node, setup
-        try:
-            self._tracker = SimdTracker(_tracker_options(setup), setup.stream(node, "array"))
-        except LineMemoryError as error:
-            raise ValueError(f"filter.simd.words is {setup.filter.simd.words}: {error}") from error
+        self._tracker = SimdTracker(_tracker_options(setup), setup.stream(node, "array"))
         self._appearance: Appearance | None = None
         self._sighting = Sighting()
         self._before = setup.start.moments
@@ -57,10 +74,10 @@ class ArrayEstimator:
             appearance: What the target looks like, to tell whether the estimate shows it.
 
         Raises:
-            ValueError: The picture is wider than the array.
+            ValueError: The array cannot begin with this picture, or with the target at that place.
         """
         self._appearance = appearance
-        self._tracker.begin(picture.image, self._before.mean[:2])
+        self._tracker.begin(picture.image, self._before.mean)
         n = float(self._setup.filter.n_particles)
         return self._message(0, self._before, n, visible=True)
 
@@ -125,11 +142,23 @@ def _tracker_options(setup: TrackingSetup) -> TrackerOptions:
         raise ValueError(
             "filter.color.space is rgb: the array's tracker bins hue or joint_rgb, take one of them"
         )
+    if chosen.color.n_bins > MAX_BINS:
+        raise ValueError(
+            f"filter.color.bins_per_channel is {chosen.color.bins_per_channel}, which makes"
+            f" {chosen.color.n_bins:,} bins, and the array's tracker has {MAX_BINS} at most: take fewer"
+        )
+    region_px = int(size_px[0]), int(size_px[1])
+    if chosen.sampling.grid != region_px:
+        raise ValueError(
+            f"filter.sampling.grid is not {list(region_px)}, which target.size_px is: the array's tracker"
+            " reads every pixel of the box, make them alike"
+        )
     return TrackerOptions(
         simd=chosen.simd,
         binning=BinningOptions(space=chosen.color.space, bins=chosen.color.bins_per_channel),
         n_particles=(chosen.n_particles,),
-        region_px=(int(size_px[0]), int(size_px[1])),
+        region_px=region_px,
+        kernel=chosen.sampling.kernel,
         process=_process(chosen.dynamics),
         noise_px=float(np.sqrt(chosen.dynamics.position_variance)),
         # set from the background, it would be too sharp for ten bits: the paper's tracker has a fixed one

@@ -32,8 +32,9 @@ from nodes.simd.programs.boxes import (
     words_for_distance,
 )
 from nodes.simd.report import FrameReport, Step
+from nodes.vision.appearance import Appearance
 from nodes.vision.color import ColorOptions
-from nodes.vision.pattern import Pattern
+from nodes.vision.pattern import Pattern, pattern_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +66,8 @@ class SimdLikelihood:
         report: What the last measurement has cost, in a frame.
 
     Raises:
-        ValueError: The sampling has no grid.
+        LineMemoryError: The program needs more words than the line memory has.
+        ValueError: The sampling has no grid, or a word is too short for its counts or for the colours.
     """
 
     def __init__(
@@ -82,6 +84,33 @@ class SimdLikelihood:
         self._kernel, (n_columns, self._n_rows) = sampling.kernel, sampling.grid
         self._columns = sample_positions(n_columns, sampling.kernel, 1.0)
         self._rows = sample_positions(self._n_rows, sampling.kernel, 0.5)
+        self._require_long_words(color)
+        self._require_line_memory(color)
+
+    def _require_long_words(self, color: ColorOptions) -> None:
+        """Counts, and the numbers of colours, must not wrap."""
+        most = (1 << self.options.bits) - 1
+        parts = rows_of_parts(self._n_rows, self._kernel, color.parts)
+        n_samples = len(self._columns) * max(part.stop - part.start for part in parts)
+        if n_samples > most:
+            raise ValueError(
+                f"sampling.grid is [{len(self._columns)}, {self._n_rows}], which has {n_samples:,} samples in"
+                f" one part of the box, and a word of {self.options.bits} bits counts to {most:,}: take fewer"
+            )
+        if color.n_bins > most:
+            raise ValueError(
+                f"color.bins_per_channel is {color.bins_per_channel}, which makes {color.n_bins:,} bins, and"
+                f" a word of {self.options.bits} bits counts to {most:,}: take fewer"
+            )
+
+    def _require_line_memory(self, color: ColorOptions) -> None:
+        """Measures a box of one colour: more of them take words that are free, or one after the other."""
+        shares = np.zeros((len(color.parts), color.n_channels, color.n_bins))
+        shares[..., 0] = 1
+        plain = Appearance(shares, shares, np.ones_like(shares), 1.0, 1.0, own=True)
+        bins, box = np.zeros((color.n_channels, 1, 1), np.uint8), np.zeros((1, 4))
+        self.measure(bins, box, pattern_of(plain, color), (1, 1))
+        self.report = None
 
     def measure(
         self,
@@ -167,8 +196,6 @@ class _Pass:
                 ratio = similarity(array, coefficient, perfect)
                 similar = array.collect(ratio, self._active) / scale.one
                 array.free(ratio)
-        # a box of which nothing is in the picture, or in the reference, has distance 1
-        similar = np.where(perfect.value[self._active] > 0, similar, 0.0)
         return _columns(counts, len(similar)), _columns(pixels, len(similar)), similar
 
     def _run_part(

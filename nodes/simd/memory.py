@@ -89,7 +89,7 @@ class LineMemory:
             uses = ", ".join(f"{name} {n}" for name, n in self._used.items() if n)
             raise LineMemoryError(
                 f"the line memory has {self.size} words, {self.used} are in use ({uses}) and"
-                f" {n_words} more are needed for {owner}: use fewer bins or particles' words, or set words"
+                f" {n_words} more are needed for {owner}: give it more (simd.words)"
             )
         self._used[owner] += n_words
         self.used += n_words

@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import accumulate
-from types import MappingProxyType
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from network.streams import stream
 from nodes.simd.array import ProcessorArray
+from nodes.simd.limits import require_fitting, require_room
 from nodes.simd.memory import ExternalMemory, Word
 from nodes.simd.programs.binning import bin_picture
 from nodes.simd.programs.counting import (
@@ -17,15 +19,15 @@ from nodes.simd.programs.counting import (
     particles_in_columns,
     region,
 )
-from nodes.simd.programs.motion import predict, seeds
+from nodes.simd.programs.motion import coefficients_of, deviation_of, predict, seeds
 from nodes.simd.programs.normalizing import Group, add_up, normalized, scale_factor, weighted_mean
 from nodes.simd.programs.resampling import replicate, replication_bounds
 from nodes.simd.programs.weighing import Reference, add_coefficient, likelihood, reference
 from nodes.simd.report import FrameReport, Step
 from nodes.simd.tracker_options import TrackerOptions
 
-BESIDE_HISTOGRAMS = MappingProxyType({1: 22, 2: 29})
-"""Words that the program needs for everything else, with numbers of one word or of two."""
+ROOMY = 1 << 12
+"""Words of a line memory in which any program fits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +53,7 @@ class SimdTracker:
 
     Raises:
         LineMemoryError: The program needs more words than the line memory has.
-        ValueError: There are more particles than processing elements.
+        ValueError: There are more particles than processing elements, or a word is too short for an option.
     """
 
     def __init__(self, options: TrackerOptions, rng: np.random.Generator, *, batching: bool = True) -> None:
@@ -59,15 +61,9 @@ class SimdTracker:
         self._rng = rng
         self.array = array = ProcessorArray(options.simd, batching=batching)
         n_used = sum(options.n_particles)
-        most = min(array.n, (1 << options.simd.bits) - 3)
-        if n_used > most:
-            raise ValueError(f"{n_used} particles are too many: the array has room for {most}")
         self._region = region(*options.region_px, options.shape, options.kernel)
-        if self._region.total >= 1 << options.simd.bits:
-            raise ValueError(
-                f"the samples of a region count {self._region.total} in all and a word holds"
-                f" {(1 << options.simd.bits) - 1}: choose a smaller region"
-            )
+        require_room(options, self._region)
+        self._coefficients = coefficients_of(options.process, options.simd.bits)
         # the rightmost elements, as in the paper
         firsts = accumulate(options.n_particles[:-1], initial=array.n - n_used)
         self._groups = [Group(first, n) for first, n in zip(firsts, options.n_particles, strict=True)]
@@ -84,9 +80,9 @@ class SimdTracker:
         red, green, blue = (array.word("Video line buffers") for _ in range(3))
         self._buffers = (red, green, blue)
         self._sampling = (array.word(), array.word(), array.word())
-        free = options.simd.words - BESIDE_HISTOGRAMS[options.simd.number_words]
-        n_words = options.histogram_words or min(options.binning.n_bins, max(free, 1))
-        self._histogram = [array.word("Histograms") for _ in range(min(n_words, options.binning.n_bins))]
+        n_bins = options.binning.n_bins
+        n_words = options.histogram_words or max(1, n_bins - _missing_words(options))
+        self._histogram = [array.word("Histograms") for _ in range(min(n_words, n_bins))]
         self._place = array.word()
         array.input(self._generator, seeds(array, rng))
         # beyond the last place in elements without a particle
@@ -96,33 +92,32 @@ class SimdTracker:
         self._targets: list[Target] = []
 
     def begin(
-        self, image: UInt8[np.ndarray, "H W 3"], *positions: Float[np.ndarray, " 2"]
+        self, image: UInt8[np.ndarray, "H W 3"], *positions: Float[np.ndarray, " _"]
     ) -> Float[np.ndarray, "G 2"]:
         """Takes the references from the first picture.
 
         Args:
             image: Blue, green, red; not wider than the array.
-            positions: x and y of each target's centre, in pixels.
+            positions: x and y of each target's centre, in pixels, and those of the frame before where they
+                differ.
 
         Returns:
             The positions.
 
         Raises:
-            ValueError: The picture is too wide, or there are not so many targets.
+            ValueError: The picture is too large or too small, there are not so many targets, one of them is
+                outside, or the noise cannot be held.
         """
         height, width = image.shape[:2]
-        if width > self.array.n:
-            raise ValueError(f"the picture is {width} pixels wide and the array has {self.array.n} elements")
-        if self.options.region_px[0] > width or self.options.region_px[1] > height:
-            raise ValueError(f"a region of {self.options.region_px} pixels is larger than the picture")
-        if len(positions) != len(self._groups):
-            raise ValueError(f"{len(positions)} positions for {len(self._groups)} targets")
+        require_fitting(self.options, width, height, positions)
         self._memory = ExternalMemory(height, width)
         # coordinates in fractions of a pixel, as fine as a word allows
         self._fraction_bits = self.options.simd.bits - (max(width, height) - 1).bit_length()
+        self._deviation = deviation_of(self.options.noise_px, self._fraction_bits, self.options.simd.bits)
         self._bin(image)
         for group, position in zip(self._groups, positions, strict=True):
-            for word, coordinate in zip(self._state, np.tile(position, 2), strict=True):
+            before = np.clip(position[-2:], 0, (width - 1, height - 1))
+            for word, coordinate in zip(self._state, np.r_[position[:2], before], strict=True):
                 lanes = word.value.copy()
                 lanes[group.elements] = round(float(coordinate) * (1 << self._fraction_bits))
                 self.array.input(word, lanes)
@@ -134,7 +129,7 @@ class SimdTracker:
             Target(group, reference(of_group, self._region.total, self.options.simd))
             for group, of_group in zip(self._groups, counts, strict=True)
         ]
-        return np.stack(positions)
+        return np.stack([position[:2] for position in positions])
 
     def step(self, image: UInt8[np.ndarray, "H W 3"]) -> Float[np.ndarray, "G 2"]:
         """One frame.
@@ -195,8 +190,8 @@ class SimdTracker:
                 self._state[axis],
                 self._state[axis + 2],
                 self._generator,
-                self.options.process,
-                round(self.options.noise_px * unit),
+                self._coefficients,
+                self._deviation,
                 (half * unit, far * unit),
             )
 
@@ -277,3 +272,17 @@ class SimdTracker:
     def _positions(self) -> Float[np.ndarray, "P 2"]:
         lanes = np.stack([word.value for word in self._state[:2]], axis=1)
         return lanes / (1 << self._fraction_bits)
+
+
+@lru_cache
+def _missing_words(options: TrackerOptions) -> int:
+    """Words that the line memory lacks for a histogram as a whole; a frame is run where there are enough."""
+    roomy = options.simd.model_copy(update={"words": ROOMY})
+    # noise that can be held in a picture of any size: this one is as small as it may be
+    whole = {"simd": roomy, "histogram_words": options.binning.n_bins, "noise_px": 1.0}
+    tracker = SimdTracker(options.model_copy(update=whole), stream(0, "simd", "words"))
+    width, height = options.region_px
+    nothing = np.zeros((height, width, 3), np.uint8)
+    tracker.begin(nothing, *[np.zeros(2)] * len(options.n_particles))
+    tracker.step(nothing)
+    return max(0, tracker.array.line_memory.high_water - options.simd.words)

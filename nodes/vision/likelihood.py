@@ -24,7 +24,7 @@ class LikelihoodOptions(Options):
     """`literal`: exp(-d²/2σ²) whatever the camera sees; `miss_floor`: never below that of a missed target."""
     calibration: Literal["fixed", "background"] = "background"
     """`fixed`: the two constants below; `background`: set at start-up from what surrounds the target."""
-    sigma: float = Field(default=0.1, gt=0)
+    sigma: float = Field(default=0.1, ge=1e-3)
     """σ of the likelihood, in units of d (fixed)."""
     miss_distance: float = Field(default=0.12, gt=0)
     """d₀²: the squared distance at which the target counts as not seen (fixed)."""

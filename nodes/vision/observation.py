@@ -65,7 +65,7 @@ class ObservationOptions(Options):
     """The array, for the backend `simd`."""
     threads: int = Field(default=1, ge=1, le=64)
     """Threads of each filter, for likelihoods and resampling; the numbers are the same with any. Too few
-    particles for so many threads are done by fewer."""
+    particles for so many threads, or too few cores, are done by fewer."""
     color: ColorOptions = ColorOptions()
     sampling: SamplingOptions = SamplingOptions()
     likelihood: LikelihoodOptions = LikelihoodOptions()

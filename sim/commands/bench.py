@@ -1,7 +1,6 @@
 """`dcpf bench`: what filter and network cost on this machine."""
 
 import json
-import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from nodes.threads import n_cores
 from sim.benchmarks.settings import SCENARIOS
 from sim.commands.bench_consensus import consensus
 from sim.commands.guard import guarded
@@ -72,7 +72,9 @@ def filter_(folder: ScenarioFolder = SCENARIOS, as_json: AsJson = False) -> None
 
 def parallel(
     folder: ScenarioFolder = SCENARIOS,
-    threads: Annotated[int | None, typer.Option(help="Threads; all cores by default.", min=1, max=64)] = None,
+    threads: Annotated[
+        int | None, typer.Option(help="Threads, at most and by default all cores.", min=1, max=64)
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for a plot and the figures.")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -82,7 +84,7 @@ def parallel(
     if out is not None:
         make_folder(out)
     with counting_bar("bench parallel", len(PARTICLES) + len(CLIP_PARTICLES)) as done:
-        report = bench_parallel(folder, threads or os.cpu_count() or 1, done)
+        report = bench_parallel(folder, min(threads or n_cores(), n_cores()), done)
     if out is not None:
         from sim.pictures.parallel import plot_parallel
         from sim.pictures.plots import write_figure

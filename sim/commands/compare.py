@@ -20,6 +20,7 @@ from sim.commands.shared import (
     Overrides,
     length_text,
     progress_bar,
+    require_backend,
     split_overrides,
 )
 from sim.experiments.found.claims import Verdict
@@ -72,7 +73,6 @@ def compare(
     # What computes and draws takes its time to import; --help does not wait for it.
     import joblib
 
-    from sim.assembly import Assembly
     from sim.experiments.computing.engine import compute_here, compute_on_cluster
     from sim.experiments.computing.store import Store
     from sim.experiments.found.claims import judge
@@ -86,7 +86,7 @@ def compare(
     given = [*split_overrides(overrides), *([("frames", str(frames))] if frames else [])]
     plan = _plan(scenarios, sweeps or [], given, runs)
     for group in plan.groups:
-        Assembly(group.scenario_run).require_backend()
+        require_backend(group.scenario_run)
     results = out or Path("runs") / f"{plan.options.name}-{datetime.now(UTC).strftime('%Y%m%dT%H%M%S.%fZ')}"
     store = Store(results / "parts")
     engine = (

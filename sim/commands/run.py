@@ -168,7 +168,7 @@ def _print(summary: dict[str, Any], scenario: Scenario, folder: Path) -> None:
 
 
 def _timing_lines(timing: dict[str, Any]) -> Iterator[str]:
-    if "frames_per_s" in timing:
+    if "first_estimate_s" in timing and "frames_per_s" in timing:
         first, rate = timing["first_estimate_s"], timing["frames_per_s"]
         yield f"first estimate after {first:.1f} s, then {rate:.0f} frames/s"
 
@@ -190,7 +190,7 @@ def _print_members(console: Console, summary: dict[str, Any]) -> None:
         console.print(f"did not reach the end: {', '.join(summary['died'])}")
 
 
-def _array_text(cost: dict[str, float], words: int) -> str:
+def _array_text(cost: dict[str, int | float], words: int) -> str:
     return (
         f"on a camera's array: {cost['cycles']:,} cycles, {1e-3 * cost['frame_us']:.1f} ms a frame at"
         f" {cost['clock_mhz']:g} MHz ({cost['share_of_frame']:.0%} of it), {cost['line_memory_words']} of"

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from nodes.setup import FilterOptions
-from nodes.threads import n_shares
+from nodes.threads import n_cores, n_shares
 from nodes.vision.observation import LEAST_BOXES
 from sim.scenario.advice import advice
 from sim.scenario.loading import load_scenario
@@ -53,17 +53,20 @@ def read_scenario(
     chosen = [(key, str(value)) for key, value in given.items() if value is not None]
     scenario = load_scenario(path, [*split_overrides(overrides), *chosen], rendered=rendered)
     if rendered:
-        _require_backend(scenario)
+        require_backend(scenario)
         _say_of_threads(scenario.filter)
     return scenario
 
 
-def _require_backend(scenario: Scenario) -> None:
+def require_backend(scenario: Scenario) -> None:
     """Fails before anything starts where this machine, or the emulated one, cannot run the filter."""
     if scenario.filter.backend != "fast":
         from sim.assembly import Assembly
 
-        Assembly(scenario).require_backend()
+        assembly = Assembly(scenario)
+        assembly.require_backend()
+        if scenario.filter.backend == "simd":
+            assembly.try_array()
 
 
 def _say_of_threads(options: FilterOptions) -> None:
@@ -71,9 +74,10 @@ def _say_of_threads(options: FilterOptions) -> None:
     n, wanted = options.n_particles, options.threads
     used = n_shares(n, wanted, LEAST_BOXES)
     if used < wanted:
+        few = f"fewer than {LEAST_BOXES:,} particles a thread would lose time, and there are {n:,}"
+        reason = few if n // LEAST_BOXES < n_cores() else "this process may use no more cores"
         Console(stderr=True).print(
-            f"filter.threads is {wanted}, and {used} will be used: fewer than {LEAST_BOXES:,} particles"
-            f" a thread would lose time, and there are {n:,}",
+            f"filter.threads is {wanted}, and {used} will be used: {reason}",
             highlight=False,
             soft_wrap=True,
         )

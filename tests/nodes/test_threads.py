@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nodes import threads
 from nodes.counting.histogram import SamplingOptions
 from nodes.filtering.particles import Particles, normalize, resample, systematic_indices
 from nodes.imaging.camera import look_at
@@ -14,6 +15,14 @@ from nodes.threads import in_shares, n_shares
 from nodes.vision import observation
 from nodes.vision.observation import ObservationModel, ObservationOptions
 from nodes.vision.target import TargetOptions
+
+
+@pytest.fixture(autouse=True, scope="module")
+def four_cores():
+    """On any machine."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(threads, "n_cores", lambda: 4)
+        yield
 
 
 @given(st.integers(0, 50), st.integers(1, 5), st.integers(1, 20))
@@ -26,8 +35,15 @@ def test_shares_cover_everything_once(n, n_threads, least):
 
     in_shares(work, n, n_threads, least)
     np.testing.assert_array_equal(touched, 1)
-    assert len(shares) == n_shares(n, n_threads, least) <= n_threads
+    assert len(shares) == n_shares(n, n_threads, least) <= min(n_threads, 4)
     assert len(shares) == 1 or min(share.stop - share.start for share in shares) >= least
+
+
+def test_no_more_threads_than_cores(monkeypatch):
+    assert n_shares(80_000, 8, 8_000) == 4
+    monkeypatch.setattr(threads, "n_cores", lambda: 2)
+    assert n_shares(80_000, 8, 8_000) == 2
+    assert n_shares(8_000, 8, 8_000) == 1
 
 
 @pytest.mark.parametrize("culprit", [0, 1])

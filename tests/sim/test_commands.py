@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from nodes import threads
 from nodes.counting.build import load_kernel
+from sim.commands import shared
 from sim.commands.app import app
 from sim.commands.inspect import scenario_schema
 from sim.running import listener
@@ -270,6 +272,15 @@ def test_threads_that_would_lose_are_said_not_to_be_used(dcpf, small):
     assert result.exit_code == 0
     assert "filter.threads is 4, and 1 will be used: fewer than 8,000" in result.stderr
     assert not dcpf("check", small).stderr
+
+
+def test_threads_without_a_core_are_said_not_to_be_used(dcpf, small, monkeypatch):
+    for module in (threads, shared):
+        monkeypatch.setattr(module, "n_cores", lambda: 2)
+    many = "--set", "filter.n_particles=100000"
+    result = dcpf("check", small, "--set", "filter.threads=8", *many)
+    assert "filter.threads is 8, and 2 will be used: this process may use no more cores" in result.stderr
+    assert not dcpf("check", small, "--set", "filter.threads=2", *many).stderr
 
 
 def test_bench_names_the_scenario_that_is_not_there(dcpf, tmp_path):

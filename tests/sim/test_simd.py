@@ -42,6 +42,11 @@ def test_the_tables_and_the_picture(tmp_path):
         ("n_particles=[400]", "400 particles are too many"),
         ("histogram_words=43", ""),
         ("sigma=0", "sigma"),
+        ("n_particles=[240,1]", "n_particles[1] must be greater than or equal to 2"),
+        ("n_particles=[]", "n_particles must have at least 1 item"),
+        ("noise_px=1e9", "the array holds 0.25, 0.5, … to 255.75"),
+        ("process=[1.3,0]", "the nearest are 1.3125 and 0"),
+        ("simd.words=20", "the line memory has 20 words"),
         ("nothing", "has no ="),
     ],
 )

@@ -114,10 +114,12 @@ class StoredPicture:
     Attributes:
         memories: One if the bins of all channels fit into an element, else one a channel.
         bits: Bits of a channel's bin in a shared element.
+        shared: Whether an element holds several channels.
     """
 
     memories: tuple[ExternalMemory, ...]
     bits: int
+    shared: bool
 
 
 def store_picture(bins: Integer[np.ndarray, "C h w"], n_bins: int, element_bits: int) -> StoredPicture:
@@ -131,7 +133,7 @@ def store_picture(bins: Integer[np.ndarray, "C h w"], n_bins: int, element_bits:
     memories = tuple(ExternalMemory(*bins.shape[1:]) for _ in planes)
     for memory, plane in zip(memories, planes, strict=True):
         memory.pixels[:] = plane
-    return StoredPicture(memories, bits)
+    return StoredPicture(memories, bits, shared=len(memories) < n_channels)
 
 
 def count_part(
@@ -175,10 +177,9 @@ def count_part(
                     if number == 0:
                         inside = array.at_least(pixel, 0)
                         array.accumulate(pixels, 1, when=inside)
-                    shared = len(picture.memories) == 1
-                    for channel in np.unique(channels) if shared else [number]:
+                    for channel in np.unique(channels) if picture.shared else [number]:
                         seen = pixel
-                        if shared and channels.max(initial=0) > 0:
+                        if picture.shared:
                             # the channel's bits of the element, or no bin at all
                             array.shift_right(own, pixel, picture.bits * int(channel))
                             array.mask(own, own, picture.bits)
@@ -226,9 +227,10 @@ def add_part(
 def normalize_part(array: ProcessorArray, coefficient: Word, pixels: Word, n_samples: int) -> None:
     """Multiplies the coefficient by √(samples / samples seen): from shares of the grid to shares of the seen.
 
-    The root has four bits before the point: it saturates where less than 1/256 of the part is in the picture.
+    The root has four bits before the point, or as many as that of all samples needs.
     """
-    n_words, point = array.options.number_words, array.options.number_bits - 4
+    before_point = max(4, -(-n_samples.bit_length() // 2))
+    n_words, point = array.options.number_words, array.options.number_bits - before_point
     ratio, root, divisor = array.number(n_words=2 * n_words), array.number(), array.number(n_words=1)
     with array.using(ratio, root, divisor):
         array.maximum(divisor, pixels, 1)
@@ -242,7 +244,10 @@ def normalize_part(array: ProcessorArray, coefficient: Word, pixels: Word, n_sam
 
 
 def similarity(array: ProcessorArray, coefficient: Word, perfect: Word) -> Word:
-    """A new word with coefficient / perfect, F bits of it after the point."""
+    """A new word with coefficient / perfect, F bits of it after the point.
+
+    It is 0, the distance 1, where nothing of a box is in the picture, or in the reference.
+    """
     ratio = array.number(n_words=2 * array.options.number_words)
     if ratio.real:
         array.copy(ratio, coefficient)
@@ -250,4 +255,5 @@ def similarity(array: ProcessorArray, coefficient: Word, perfect: Word) -> Word:
         one = 1 << array.options.number_bits
         array.multiply(ratio, coefficient, one, b_words=array.options.number_words + 1)
     divide(array, ratio, perfect)
+    array.copy(ratio, 0, when=array.equal(perfect, 0))
     return ratio

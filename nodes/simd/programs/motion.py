@@ -14,6 +14,51 @@ XORSHIFTS = MappingProxyType({8: (7, 9, 8), 9: (3, 7, 4), 10: (7, 3, 9), 11: (7,
 """For words of so many bits three shifts that give a generator of two words its full period."""
 FRACTION_BITS = 4
 """A and B are in sixteenths."""
+ROUNDING = 0.1
+"""Part of its standard deviation by which rounding may change the noise."""
+
+
+def coefficients_of(process: tuple[float, float], bits: int) -> tuple[int, int]:
+    """A and B as the array holds them.
+
+    Args:
+        process: A and B.
+        bits: Of a word.
+
+    Raises:
+        ValueError: They are no sixteenths, or so large that A x + B x' could leave its two words.
+    """
+    unit = 1 << FRACTION_BITS
+    most = (1 << bits - 1) - 1
+    A, B = (round(weight * unit) for weight in process)
+    if (A / unit, B / unit) != process or abs(A) + abs(B) > most:
+        raise ValueError(
+            f"A is {process[0]:g} and B is {process[1]:g}: the array holds sixteenths, which add up to"
+            f" {most / unit:g} at most without their signs; the nearest are {A / unit:g} and {B / unit:g}"
+        )
+    return A, B
+
+
+def deviation_of(noise_px: float, fraction_bits: int, bits: int) -> int:
+    """The noise's standard deviation as the array holds it, to the nearest unit of the state.
+
+    Args:
+        noise_px: The standard deviation in pixels.
+        fraction_bits: Bits of the state after the point.
+        bits: Of a word.
+
+    Raises:
+        ValueError: It does not fit a word, or rounding would make it another.
+    """
+    unit, most = 1 << fraction_bits, (1 << bits) - 1
+    held = min(max(round(noise_px * unit), 1), most)
+    if abs(held / unit - noise_px) > ROUNDING * noise_px:
+        raise ValueError(
+            f"the motion's noise has a standard deviation of {noise_px:g} pixels, and the array holds"
+            f" {1 / unit:g}, {2 / unit:g}, … to {most / unit:g}: the nearest is {held / unit:g} (noise_px, or"
+            " the root of filter.dynamics.position_variance)"
+        )
+    return held
 
 
 def xorshift(array: ProcessorArray, state: Word) -> None:
@@ -58,7 +103,7 @@ def predict(
     now: Word,
     before: Word,
     generator: Word,
-    process: tuple[float, float],
+    coefficients: tuple[int, int],
     standard_deviation: int,
     limits: tuple[int, int],
 ) -> None:
@@ -69,11 +114,10 @@ def predict(
         now: x(t), which becomes x(t+1).
         before: x(t-1), which becomes x(t).
         generator: Of the elements' noise.
-        process: A and B.
+        coefficients: A and B in sixteenths.
         standard_deviation: σ in units of the state.
         limits: The least and greatest coordinate; beyond them it saturates.
     """
-    coefficients = [round(coefficient * (1 << FRACTION_BITS)) for coefficient in process]
     with array.using(array.number(n_words=2, signed=True)) as (noise,):
         gaussian(array, noise, generator, standard_deviation)
         mean, term = array.number(n_words=2, signed=True), array.number(n_words=2, signed=True)

@@ -5,6 +5,7 @@ import pytest
 
 from nodes.counting.histogram import SamplingOptions, count
 from nodes.simd.likelihood import SimdLikelihood
+from nodes.simd.memory import LineMemoryError
 from nodes.simd.options import SimdOptions
 from nodes.vision.appearance import Appearance
 from nodes.vision.color import ColorOptions
@@ -70,6 +71,16 @@ def test_fixed_point_distances_are_near(color, arithmetic, bound):
     assert (result.squared_distance[pixels.sum(axis=1) == 0] == 1).all()
 
 
+@pytest.mark.parametrize("grid", [(16, 16), (20, 20), (31, 33)])
+@pytest.mark.parametrize(("arithmetic", "bound"), [("float", 1e-12), ("fixed10", 0.06), ("fixed20", 1e-3)])
+def test_many_samples_are_as_near_as_few(grid, arithmetic, bound):
+    sampling = SamplingOptions(grid=grid)
+    result, _, counts, pixels, distance = measured(ColorOptions(), 4, sampling, arithmetic=arithmetic)
+    np.testing.assert_array_equal(result.counts, counts)
+    seen = pixels.sum(axis=1) >= 0.5 * grid[0] * grid[1]
+    assert np.abs(result.squared_distance - distance)[seen].max() < bound
+
+
 @EVERY_COLOUR
 def test_fewer_words_read_the_samples_more_often(color):
     many, report, *_ = measured(color, 1, words=120)
@@ -79,6 +90,16 @@ def test_fewer_words_read_the_samples_more_often(color):
     assert small.n_words <= 30
     reads = [sum(cost.external_reads for cost in each.costs.values()) for each in (report, small)]
     assert reads[0] <= reads[1]
+
+
+@EVERY_COLOUR
+@pytest.mark.parametrize(("arithmetic", "least"), [("fixed10", 21), ("fixed20", 28)])
+def test_as_many_words_as_one_colour_takes_are_enough(color, arithmetic, least):
+    enough, *_ = measured(color, 1, words=least, arithmetic=arithmetic)
+    many, *_ = measured(color, 1, words=120, arithmetic=arithmetic)
+    np.testing.assert_array_equal(enough.squared_distance, many.squared_distance)
+    with pytest.raises(LineMemoryError, match=r"give it more \(simd.words\)"):
+        SimdLikelihood(SimdOptions(words=least - 1, arithmetic=arithmetic), color, SamplingOptions())
 
 
 def test_all_at_once_is_as_one_by_one():
@@ -101,3 +122,20 @@ def test_an_element_holds_the_bins_of_all_channels_if_they_fit():
 def test_a_box_of_any_size_needs_a_grid():
     with pytest.raises(ValueError, match="give columns and rows"):
         SimdLikelihood(SimdOptions(), ColorOptions(), SamplingOptions(grid=None))
+
+
+@pytest.mark.parametrize(
+    ("grid", "color", "sentence"),
+    [
+        ((32, 32), ColorOptions(), r"grid is \[32, 32\], which has 1,024 samples .* counts to 1,023: take"),
+        ((64, 40), COLOURS["channels of parts"], "1,152 samples in one part"),
+        ((5, 5), ColorOptions(space="joint_rgb", bins_per_channel=11), "is 11, which makes 1,331 bins"),
+    ],
+)
+def test_what_would_wrap_is_refused(grid, color, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        SimdLikelihood(SimdOptions(), color, SamplingOptions(grid=grid))
+
+
+def test_a_grid_that_fills_a_word_is_taken():
+    SimdLikelihood(SimdOptions(), ColorOptions(), SamplingOptions(grid=(33, 31)))

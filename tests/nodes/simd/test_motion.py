@@ -89,7 +89,7 @@ def test_prediction_is_equation_2_within_the_limits(arithmetic):
         array.input(generator, seeds(array, np.random.default_rng(0)))
         array.input(now, np.arange(320) + 300)
         array.input(before, 2 * np.arange(320) + 100)
-        predict(array, now, before, generator, (1.5, -0.5), standard_deviation, (28, 900))
+        predict(array, now, before, generator, (24, -8), standard_deviation, (28, 900))
         return now.value, before.value
 
     now, before = run(0)

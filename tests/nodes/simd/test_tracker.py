@@ -164,6 +164,8 @@ def test_too_small_a_line_memory_is_refused():
     [
         ({"n_particles": (300, 21)}, "321 particles are too many: the array has room for 320"),
         ({"region_px": (40, 40)}, "choose a smaller region"),
+        ({"process": (1.3, 0.0)}, "the nearest are 1.3125 and 0"),
+        ({"process": (30.0, -2.0)}, "add up to 31.9375 at most"),
     ],
 )
 def test_what_the_array_cannot_hold_is_refused(chosen, message):
@@ -179,3 +181,32 @@ def test_what_does_not_fit_the_picture_is_refused():
         tracker.begin(np.zeros((10, 400, 3), np.uint8), path(0))
     with pytest.raises(ValueError, match="larger than the picture"):
         tracker.begin(np.zeros((10, 40, 3), np.uint8), path(0))
+    with pytest.raises(ValueError, match="1100 pixels and a word of 10 bits tells 1024 apart"):
+        tracker.begin(np.zeros((1100, 40, 3), np.uint8), path(0))
+    with pytest.raises(ValueError, match="outside of the picture of 256 x 240 pixels"):
+        tracker.begin(picture(0), np.array([-5.0, 100.0]))
+
+
+@pytest.mark.parametrize("noise_px", [0.1, 0.3, 300.0, 1e20])
+def test_noise_that_a_word_cannot_hold_is_refused(noise_px):
+    tracker = SimdTracker(options(noise_px=noise_px), np.random.default_rng(0))
+    with pytest.raises(ValueError, match=r"the array holds 0\.25, 0\.5, … to 255\.75"):
+        tracker.begin(picture(0), path(0))
+
+
+@pytest.mark.parametrize(
+    "binning", [BinningOptions(bins=44), BinningOptions(space="joint_rgb", bins=7)], ids=["hue", "joint"]
+)
+def test_colours_that_short_words_cannot_hold_are_refused(binning):
+    chosen = TrackerOptions(simd=SimdOptions(bits=8), binning=binning, n_particles=(100,))
+    with pytest.raises(ValueError, match="bins are too many for words of 8 bits"):
+        SimdTracker(chosen, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("arithmetic", ["fixed10", "fixed20"])
+@pytest.mark.parametrize("resampling", ["simplified", "residual", "systematic"])
+def test_histograms_take_the_words_that_are_left(arithmetic, resampling):
+    simd = SimdOptions(arithmetic=arithmetic, resampling=resampling, words=50)
+    tracker = SimdTracker(TrackerOptions(simd=simd), np.random.default_rng(0))
+    followed(tracker, 2)
+    assert tracker.report().n_words == 50

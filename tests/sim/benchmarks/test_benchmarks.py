@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from nodes import threads
 from sim.benchmarks import parallel
 from sim.benchmarks.filtering import bench_filter, n_rounds
 from sim.benchmarks.settings import LOOP, SCENARIOS, SETTINGS, setting
@@ -60,6 +61,7 @@ def test_threads_and_one_thread_agree_in_the_clip(monkeypatch):
     monkeypatch.setattr(parallel, "PARTICLES", (300, 17_000))
     monkeypatch.setattr(parallel, "CLIP_PARTICLES", (300, 17_000))
     monkeypatch.setattr(parallel, "ROUNDS", 1)
+    monkeypatch.setattr(threads, "n_cores", lambda: 2)
     report = parallel.bench_parallel(SCENARIOS, 2, n_frames=4)
     assert report["threads"] == 2
     assert report["particles"] == 17_000
