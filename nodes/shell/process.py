@@ -74,13 +74,22 @@ class Shell:
                 return self._obey(order)
         return False
 
-    def wait_for_stop(self) -> None:
-        """Stays until everybody is done: a goodbye could overtake the last messages to the others."""
+    def leave(self, frame: int, counters: Counters, *, finished: bool) -> None:
+        """Tells the last and stays until everybody is done: a goodbye could overtake the last messages.
+
+        Args:
+            frame: The last frame that the node has finished.
+            counters: What it has counted.
+            finished: Whether that was the run's last.
+        """
         limit = time.monotonic() + self.pace.deadline_s
-        while not self.stopped and time.monotonic() < limit:
-            order = self.transport.wait_for_control(PATIENCE_S)
-            if order is not None and order.action == "stop":
+        order = None
+        while order is None or order.action != "stop":
+            # Said again until the end, for a router that is away.
+            self.report("done" if finished else "failed", frame, counters)
+            if self.stopped or time.monotonic() >= limit:
                 return
+            order = self.transport.wait_for_control(PATIENCE_S)
 
     def _obey(self, order: ControlMessage) -> bool:
         if order.action == "stop":
@@ -183,8 +192,7 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         state = returning.missed(node, index)
     _rounds(node, begun, shell)
     source.close()
-    shell.report("failed" if shell.stopped else "done", done, node.counters)
-    shell.wait_for_stop()
+    shell.leave(done, node.counters, finished=not shell.stopped)
 
 
 def _rounds(node: SmartCamera, begun: dict[int, float], shell: Shell, frame: int | None = None) -> None:
@@ -279,8 +287,7 @@ def run_central(node: Central, links: Links, shell: Shell) -> None:
                 if node.frame == index:
                     _send(node.on_deadline(), shell)
         shell.report_now_and_then(node.frame - 1, {})
-    shell.report("done" if node.frame == shell.frames else "failed", node.frame - 1, {})
-    shell.wait_for_stop()
+    shell.leave(node.frame - 1, {}, finished=node.frame == shell.frames)
 
 
 def _read(node: Central, cameras: Iterable[str], shell: Shell) -> None:

@@ -64,3 +64,12 @@ def test_nodes_talk_to_each_other_while_the_router_is_away(summary):
     assert ("restart", "router") in [(each["event"], each["node"]) for each in events]
     assert found["network"]["late"] < 60
     assert [found["members"]["per_frame"][name][-1] for name in NAMES] == [4] * 4
+
+
+@pytest.mark.parametrize(("pace", "frame"), [("lockstep", 5), ("realtime", 17)])
+def test_nodes_that_end_while_the_router_is_away_are_not_taken_for_dead(summary, pace, frame):
+    found, events = summary(20, {"kind": "restart_router", "frame": frame}, pace=pace)
+    assert found["died"] == []
+    assert ("restart", "router") in [(each["event"], each["node"]) for each in events]
+    assert found["network"]["messages_per_frame"] == 24
+    assert not {"died", "left"} & {each["event"] for each in events}
