@@ -262,11 +262,14 @@ def run_central(node: Central, links: Links, shell: Shell) -> None:
     """The life of the central node."""
     if not shell.wait_for_start(node.cameras):
         return
-    while node.frame < shell.frames and node.cameras and not shell.stopped:
+    while node.frame < shell.frames and not shell.stopped:
         index = node.frame
         shell.await_frame(index)
         # cameras that were gone and send again
-        _read(node, set(links.cameras) - node.cameras, shell)
+        there = [camera for camera in links.cameras if shell.transport.alive(camera)]
+        if not node.cameras and not there:
+            break
+        _read(node, set(there) - node.cameras, shell, 0 if node.cameras else PATIENCE_S)
         deadline = shell.began(index) + shell.pace.budget_s
         while node.frame == index and node.cameras and not shell.stopped:
             camera = node.waiting_for[0]
@@ -290,11 +293,11 @@ def run_central(node: Central, links: Links, shell: Shell) -> None:
     shell.leave(node.frame - 1, {}, finished=node.frame == shell.frames)
 
 
-def _read(node: Central, cameras: Iterable[str], shell: Shell) -> None:
-    """Takes what has come from cameras, without waiting."""
+def _read(node: Central, cameras: Iterable[str], shell: Shell, timeout_s: float = 0) -> None:
+    """Takes what has come from cameras; waits so long for each."""
     for camera in sorted(cameras):
         if shell.transport.alive(camera):
-            message = shell.transport.receive(camera, 0)
+            message = shell.transport.receive(camera, timeout_s)
             if isinstance(message, PixelsMessage):
                 _send(node.on_message(message), shell)
 

@@ -20,6 +20,8 @@ ASK_S = 0.5
 """How long a neighbour has for telling what it knows."""
 LOOK_S = 0.05
 """How often a node that hears nobody looks whether somebody is back."""
+COMPANY = 0.5
+"""Part of the deadline for which it does; the central node waits for its next picture until the deadline."""
 
 
 class Returning:
@@ -74,7 +76,7 @@ class Returning:
         if self._there() or not self._neighbors:
             self._waited = False
             return
-        limit = time.monotonic() + (0.0 if self._waited else self._pace.deadline_s)
+        limit = time.monotonic() + (0.0 if self._waited else COMPANY * self._pace.deadline_s)
         while not self._there() and time.monotonic() < limit:
             self._transport.wait_until_alive(self._neighbors, LOOK_S)
         self._waited = True
