@@ -169,6 +169,9 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         image = source.read(index) if index else first
         if state is not None:
             node.on_return(image, state)
+            state = None
+        elif (state := returning.missed(node, index)) is not None:
+            continue
         # pixels to the central node, which confirms them in lockstep
         if links.sinks:
             if shell.pace.kind == "lockstep":
@@ -189,7 +192,6 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         done = done if shell.stopped else index
         shell.show(node, index, image)
         index += 1
-        state = returning.missed(node, index)
     _rounds(node, begun, shell)
     source.close()
     shell.leave(done, node.counters, finished=not shell.stopped)
@@ -294,12 +296,13 @@ def run_central(node: Central, links: Links, shell: Shell) -> None:
 
 
 def _read(node: Central, cameras: Iterable[str], shell: Shell, timeout_s: float = 0) -> None:
-    """Takes what has come from cameras; waits so long for each."""
+    """Takes all that has come from cameras; waits so long for the next."""
     for camera in sorted(cameras):
-        if shell.transport.alive(camera):
+        while shell.transport.alive(camera):
             message = shell.transport.receive(camera, timeout_s)
-            if isinstance(message, PixelsMessage):
-                _send(node.on_message(message), shell)
+            if not isinstance(message, PixelsMessage):
+                break
+            _send(node.on_message(message), shell)
 
 
 def _send(messages: Iterable[ConsensusMessage | EstimateMessage | ConfirmMessage], shell: Shell) -> None:

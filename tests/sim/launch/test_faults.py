@@ -103,3 +103,19 @@ def test_the_central_node_waits_for_a_camera_that_is_late_where_there_is_no_othe
     assert code == 0, stderr
     told = map(json.loads, of_central(launched.lines("estimates")))
     assert [(each["frame"], each["members"]) for each in told] == [(frame, ["A"]) for frame in range(6)]
+
+
+def test_who_hung_in_lockstep_comes_back_once_and_tells_nothing_of_what_it_has_missed(summary, launched):
+    found, _ = summary(40, {"kind": "hang", "node": "B", "frame": 5, "frames": 10}, pace="lockstep")
+    changes = [(each["event"], each["node"]) for each in found["members"]["events"]]
+    assert changes == [("lost", "B"), ("back", "B")]
+    per_frame = found["members"]["per_frame"]["B"]
+    assert per_frame[7:14] == [None] * 7
+    assert [found["members"]["per_frame"][name][-1] for name in NAMES] == [4] * 4
+    assert json.loads(of_central(launched.lines("estimates"))[-1])["members"] == NAMES
+
+
+def test_who_hung_past_the_end_tells_nothing_any_more(summary):
+    found, _ = summary(20, {"kind": "hang", "node": "B", "frame": 5, "frames": 90}, pace="lockstep")
+    assert found["died"] == []
+    assert found["members"]["per_frame"]["B"][7:] == [None] * 13
