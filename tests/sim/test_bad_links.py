@@ -13,6 +13,7 @@ from sim.scenario.loading import load_scenario
 
 LOSS = ("network.conditions.loss", "0.3")
 DELAY = ("network.conditions.delay_s", "0.1")
+NARROW = ("network.conditions.bytes_per_s", "20000")
 REALTIME = ("pace", "realtime")
 LONGER = ("frames", "16")
 
@@ -156,6 +157,9 @@ def test_where_links_lose_the_robust_preset_takes_ratio_consensus(small):
         ([DELAY, REALTIME], "which takes 0.3 s on these links, so that estimates come 3 frames after"),
         ([DELAY, REALTIME, ("network.iterations", "5")], "2 rounds of finite_time bring them sooner"),
         ([DELAY, REALTIME, ("network.lag_frames", "1")], "lag_frames is 1, and 3 rounds of 0.1 s need 3"),
+        ([NARROW], None),
+        ([NARROW, REALTIME], "take 1.6 s: cameras may be on their own at first; allow 311760,"),
+        ([("network.conditions.bytes_per_s", "400000"), REALTIME], None),
     ],
 )  # fmt: skip
 def test_what_is_hardly_meant_is_said(small, overrides, said):
