@@ -18,6 +18,8 @@ Outgoing = tuple[ConfirmMessage | EstimateMessage, ...]
 
 MAX_AHEAD = 4
 """Frames ahead of its own whose pictures the central node keeps; no sender can fill its memory."""
+MAX_BEHIND = 2
+"""Frames by which the pictures of a camera that is back may be late: the next one will not be."""
 
 
 class Central:
@@ -48,9 +50,11 @@ class Central:
             return ()
         camera = self._models[message.sender].camera
         fits = message.image.shape[:2] == (camera.height_px, camera.width_px)
-        if fits and 0 <= message.frame - self._frame <= MAX_AHEAD:
+        ahead = message.frame - self._frame
+        if fits and -MAX_BEHIND <= ahead <= MAX_AHEAD:
             self._cameras.add(message.sender)
             self._newest[message.sender] = message.frame
+        if fits and 0 <= ahead <= MAX_AHEAD:
             self._images.setdefault(message.frame, {})[message.sender] = message.image
         return self._while_complete()
 

@@ -140,6 +140,9 @@ class Transport(Protocol):
     def alive(self, name: str) -> bool:
         """Whether a node has announced itself and is there."""
 
+    def gone_meanwhile(self) -> frozenset[str]:
+        """Nodes that have gone since this was last called, also those that are back."""
+
     def wait_until_alive(self, names: Iterable[str], timeout_s: float) -> tuple[str, ...]:
         """Waits until nodes are alive; returns those that are still missing when time is up."""
 

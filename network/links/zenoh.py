@@ -72,6 +72,7 @@ class ZenohTransport:
         self._heard = links.heard()
         self._token_key = keys.alive(run, name)
         self._alive: set[str] = set()
+        self._gone: set[str] = set()  # since somebody last wanted to know
         self._away = set(self._heard)  # of those who speak to this node
         self._receivers: dict[type, tuple[str, ...]] = dict.fromkeys(links.receivers(), ())  # that are alive
         self._lock = threading.RLock()  # held whenever what has come, or who is there, is touched
@@ -95,6 +96,12 @@ class ZenohTransport:
     def alive(self, name: str) -> bool:
         """Whether a node has announced itself and is there."""
         return name in self._alive
+
+    def gone_meanwhile(self) -> frozenset[str]:
+        """Nodes that have gone since this was last called, also those that are back."""
+        with self._lock:
+            gone, self._gone = frozenset(self._gone), set()
+            return gone
 
     def wait_until_alive(self, names: Iterable[str], timeout_s: float) -> tuple[str, ...]:
         """Waits until nodes are alive; returns those that are still missing when time is up."""
@@ -265,6 +272,7 @@ class ZenohTransport:
                 self._alive.add(name)
             else:
                 self._alive.discard(name)
+                self._gone.add(name)
             self._away = self._heard.keys() - self._alive
             self._receivers = {
                 kind: tuple(other for other in others if other in self._alive)

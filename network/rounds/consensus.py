@@ -132,6 +132,9 @@ class Consensus:
             self.counters["duplicate" if position == last else "old"] += 1
             return ()
         self._heard[sender] = position
+        frame, _ = self._position
+        if last < (frame, 1) and message.frame > frame and sender in self._present:
+            self._leave_out(sender)  # it has left out the frame
         self._keep(message)
         return self._await_no_more(sender, position)
 

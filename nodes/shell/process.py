@@ -74,13 +74,22 @@ class Shell:
                 return self._obey(order)
         return False
 
-    def wait_for_stop(self) -> None:
-        """Stays until everybody is done: a goodbye could overtake the last messages to the others."""
+    def leave(self, frame: int, counters: Counters, *, finished: bool) -> None:
+        """Tells the last and stays until everybody is done: a goodbye could overtake the last messages.
+
+        Args:
+            frame: The last frame that the node has finished.
+            counters: What it has counted.
+            finished: Whether that was the run's last.
+        """
         limit = time.monotonic() + self.pace.deadline_s
-        while not self.stopped and time.monotonic() < limit:
-            order = self.transport.wait_for_control(PATIENCE_S)
-            if order is not None and order.action == "stop":
+        order = None
+        while order is None or order.action != "stop":
+            # Said again until the end, for a router that is away.
+            self.report("done" if finished else "failed", frame, counters)
+            if self.stopped or time.monotonic() >= limit:
                 return
+            order = self.transport.wait_for_control(PATIENCE_S)
 
     def _obey(self, order: ControlMessage) -> bool:
         if order.action == "stop":
@@ -160,6 +169,9 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         image = source.read(index) if index else first
         if state is not None:
             node.on_return(image, state)
+            state = None
+        elif (state := returning.missed(node, index)) is not None:
+            continue
         # pixels to the central node, which confirms them in lockstep
         if links.sinks:
             if shell.pace.kind == "lockstep":
@@ -180,11 +192,9 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         done = done if shell.stopped else index
         shell.show(node, index, image)
         index += 1
-        state = returning.missed(node, index)
     _rounds(node, begun, shell)
     source.close()
-    shell.report("failed" if shell.stopped else "done", done, node.counters)
-    shell.wait_for_stop()
+    shell.leave(done, node.counters, finished=not shell.stopped)
 
 
 def _rounds(node: SmartCamera, begun: dict[int, float], shell: Shell, frame: int | None = None) -> None:
@@ -254,11 +264,14 @@ def run_central(node: Central, links: Links, shell: Shell) -> None:
     """The life of the central node."""
     if not shell.wait_for_start(node.cameras):
         return
-    while node.frame < shell.frames and node.cameras and not shell.stopped:
+    while node.frame < shell.frames and not shell.stopped:
         index = node.frame
         shell.await_frame(index)
         # cameras that were gone and send again
-        _read(node, set(links.cameras) - node.cameras, shell)
+        there = [camera for camera in links.cameras if shell.transport.alive(camera)]
+        if not node.cameras and not there:
+            break
+        _read(node, set(there) - node.cameras, shell, 0 if node.cameras else PATIENCE_S)
         deadline = shell.began(index) + shell.pace.budget_s
         while node.frame == index and node.cameras and not shell.stopped:
             camera = node.waiting_for[0]
@@ -279,17 +292,17 @@ def run_central(node: Central, links: Links, shell: Shell) -> None:
                 if node.frame == index:
                     _send(node.on_deadline(), shell)
         shell.report_now_and_then(node.frame - 1, {})
-    shell.report("done" if node.frame == shell.frames else "failed", node.frame - 1, {})
-    shell.wait_for_stop()
+    shell.leave(node.frame - 1, {}, finished=node.frame == shell.frames)
 
 
-def _read(node: Central, cameras: Iterable[str], shell: Shell) -> None:
-    """Takes what has come from cameras, without waiting."""
+def _read(node: Central, cameras: Iterable[str], shell: Shell, timeout_s: float = 0) -> None:
+    """Takes all that has come from cameras; waits so long for the next."""
     for camera in sorted(cameras):
-        if shell.transport.alive(camera):
-            message = shell.transport.receive(camera, 0)
-            if isinstance(message, PixelsMessage):
-                _send(node.on_message(message), shell)
+        while shell.transport.alive(camera):
+            message = shell.transport.receive(camera, timeout_s)
+            if not isinstance(message, PixelsMessage):
+                break
+            _send(node.on_message(message), shell)
 
 
 def _send(messages: Iterable[ConsensusMessage | EstimateMessage | ConfirmMessage], shell: Shell) -> None:

@@ -154,9 +154,10 @@ class Launch:
             message = self._next()
             yield message
             if isinstance(message, StatusMessage) and message.state in ("done", "failed"):
-                working.discard(message.node)
-                if message.state == "failed":
+                # which it says more than once
+                if message.state == "failed" and message.node in working:
                     self._bury(message.node, "left", "left before the end")
+                working.discard(message.node)
             ended.update(children.ended())
             if self._hearing.is_behind:
                 continue  # what they said before is heard first

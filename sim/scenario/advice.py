@@ -1,10 +1,14 @@
 """What a valid scenario may not be meant to say: one sentence each, with the remedy."""
 
 import json
+import math
 from collections.abc import Iterator
+
+import numpy as np
 
 from network.averaging.finite_time import roots_of
 from nodes.estimators.array_estimator import not_on_array
+from nodes.vision.appearance import pack_looks
 from sim.scenario.model import Scenario
 
 
@@ -24,6 +28,8 @@ def advice(scenario: Scenario) -> Iterator[str]:
             f"network.consensus is {network.consensus.algorithm}, whose average suffers from every message"
             f" that only one end of a link has in time: {where}, ratio does not"
         )
+    if scenario.pace == "realtime":
+        yield from _slow_start(scenario)
     if scenario.pace != "realtime" or not message_s:
         return
     if cut:
@@ -49,4 +55,20 @@ def _array_advice(scenario: Scenario) -> Iterator[str]:
         yield (
             f"{scenario.cameras[0].name} alone runs on the array as Medeiros et al. have it, with {does},"
             " whatever the scenario says"
+        )
+
+
+def _slow_start(scenario: Scenario) -> Iterator[str]:
+    """Frame 0, whose messages are by far the longest: they say what the target looks like."""
+    network = scenario.network
+    given = [each.bytes_per_s for each in (network.conditions, *network.conditions.links)]
+    slowest = min((each for each in given if each is not None), default=np.inf)
+    n_bytes = len(pack_looks(None, scenario.filter.color)) * np.dtype(network.payload.encoding).itemsize
+    takes_s, has_s = network.iterations * n_bytes / slowest, (1 + scenario.lag_frames) / scenario.rate_hz
+    if takes_s > has_s:
+        yield (
+            f"network.conditions.bytes_per_s is {slowest:.0f}, and in frame 0, which has {has_s:.2g} s,"
+            f" {network.iterations} rounds of {n_bytes} bytes, which say what the target looks like, take"
+            f" {takes_s:.2g} s: cameras may be on their own at first; allow"
+            f" {math.ceil(network.iterations * n_bytes / has_s)}, or take fewer network.iterations"
         )

@@ -138,6 +138,16 @@ def test_who_is_left_out_by_the_other_end_leaves_it_out_too():
     np.testing.assert_allclose([network.nodes[name].value[0] for name in "ABC"], [0.0, 4.5, 4.5])
 
 
+def test_who_has_left_out_a_frame_is_no_member_of_it():
+    """It was awaited, and its first word is of a later frame."""
+    network = Network(graph.ring(NAMES[:4]), 6)
+    queue = [(name, m) for name in "ACD" for m in network.nodes[name].begin(3, np.array([1.0]))]
+    queue += [("B", m) for m in network.nodes["B"].begin(5, np.array([1.0]))]
+    network.deliver(queue)
+    members = network.members()
+    assert {name: members[name] for name in "ACD"} == dict.fromkeys("ACD", ("A", "C", "D"))
+
+
 def test_nothing_is_told_where_every_link_is_up():
     membership = Membership("A", graph.ring(NAMES), 12)
     assert membership.reports(5) == ()

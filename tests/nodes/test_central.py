@@ -67,7 +67,19 @@ def test_a_lost_camera_is_not_waited_for_any_more(bench):
     assert frames_of(bench.central.on_lost("C3")) == [1]
     assert bench.central.cameras == {"C1", "C2", "C4"}
     assert frames_of(bench.send(2, "C1", "C2", "C4")) == [2]
-    assert bench.send(2, "C3") == []  # it is no camera of the run any more
+
+
+def test_a_camera_that_was_gone_is_waited_for_when_it_is_hardly_behind(bench):
+    bench.send(0, *NAMES)
+    bench.central.on_lost("C3")
+    for frame in range(1, 5):
+        bench.send(frame, "C1", "C2", "C4")
+    assert bench.send(2, "C3") == []
+    assert "C3" not in bench.central.cameras
+    assert bench.send(4, "C3") == []  # too late by one frame
+    assert bench.send(5, "C1", "C2", "C4") == []
+    (_, estimate) = bench.send(5, "C3")
+    assert estimate.members == NAMES
 
 
 def test_a_camera_that_skips_frames_is_waited_for_until_it_is_known_to(bench):

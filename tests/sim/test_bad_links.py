@@ -18,6 +18,7 @@ RATIO = ("network.consensus", "{algorithm: ratio}")
 METROPOLIS = ("network.consensus", "{algorithm: metropolis}")
 HASTY = ("network.lag_frames", "1")
 CUT = "lag_frames is 1, and 3 rounds of 0.1 s need 3: rounds will be cut"
+NARROW = ("network.conditions.bytes_per_s", "20000")
 REALTIME = ("pace", "realtime")
 LONGER = ("frames", "16")
 
@@ -166,6 +167,9 @@ def test_where_links_lose_the_robust_preset_takes_ratio_consensus(small):
         ([JITTER, REALTIME, HASTY], {CUT, "where jitter has rounds cut, ratio does not"}),
         ([JITTER, REALTIME, HASTY, RATIO], {CUT}),
         ([JITTER, LOSS, REALTIME, HASTY, METROPOLIS], {CUT, "on links that lose messages, ratio does not"}),
+        ([NARROW], set()),
+        ([NARROW, REALTIME], {"take 1.6 s: cameras may be on their own at first; allow 311760,"}),
+        ([("network.conditions.bytes_per_s", "400000"), REALTIME], set()),
     ],
 )  # fmt: skip
 def test_what_is_hardly_meant_is_said(small, overrides, said):
