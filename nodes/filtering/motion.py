@@ -98,7 +98,7 @@ def motion_model(n_axes: int, interval: float, options: DynamicsOptions) -> Moti
 def transition(states: Float[np.ndarray, "N D"], model: MotionModel) -> Float[np.ndarray, "N D"]:
     """F x of every particle, without noise."""
     # One row a component: NumPy is quick along the long axis only.
-    return (model.F @ states.T).T
+    return model.F.dot(states.T).T
 
 
 def predict(
@@ -107,5 +107,6 @@ def predict(
     """Draws from the prior P(x(k) | x(k-1)), the proposal of the SIR filter."""
     # x(k) = F x(k-1) + ξ(k), ξ = G n: nothing is drawn for what only remembers
     G = model.deviations
-    noise = G @ rng.standard_normal((G.shape[1], len(states)))
-    return transition(states, model) + noise.T
+    moved = transition(states, model)
+    moved += G.dot(rng.standard_normal((G.shape[1], len(states)))).T
+    return moved
