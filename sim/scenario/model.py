@@ -19,7 +19,7 @@ from sim.faults.options import FaultOptions, require_possible
 from sim.scenario.cameras import Cameras, Name
 from sim.scenario.graphs import DescribedGraph
 from sim.scenario.presets import PresetName
-from sim.simulation.sensor import SensorOptions
+from sim.scenario.sensor import SensorOptions
 from sim.world.world import WorldOptions
 
 

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nodes.imaging.camera import look_at
-from sim.simulation.sensor import SensorOptions, Sensors, measure
+from sim.scenario.sensor import SensorOptions
+from sim.simulation.sensor import Sensors, measure
 
 seeds = st.integers(0, 2**32 - 1)
 
