@@ -89,6 +89,7 @@ class RunReport:
         events: Who was lost, and came back.
         links: Bytes and messages of each link.
         timing: How long it took.
+        array: What a frame costs on a camera's emulated array.
         scenario: The scenario as run, YAML.
     """
 
@@ -106,6 +107,7 @@ class RunReport:
     events: Table | None
     links: Table | None
     timing: Table | None
+    array: Table | None
     scenario: str
 
 

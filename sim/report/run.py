@@ -15,7 +15,14 @@ from sim.pictures.plots import plot_errors
 from sim.report.elements import Plot, RunReport
 from sim.report.figures import WIDTH_IN, plot_disagreement, plot_heights, plot_members, plot_paths, plot_world
 from sim.report.retelling import filmed, told_again
-from sim.report.run_tables import events_table, figures_table, links_table, messages_table, timing_table
+from sim.report.run_tables import (
+    array_table,
+    events_table,
+    figures_table,
+    links_table,
+    messages_table,
+    timing_table,
+)
 from sim.report.stills import choose_moments, drawn_in, moments_of
 from sim.report.svg import inline
 from sim.results.convergence import converge
@@ -65,6 +72,7 @@ def run_report(
         events=events_table(summary),
         links=links_table(results, assembly, summary),
         timing=timing_table(summary),
+        array=array_table(results, summary),
         scenario=scenario,
     )
 

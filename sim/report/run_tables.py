@@ -156,6 +156,25 @@ def timing_table(summary: Mapping[str, Any]) -> Table | None:
     )
 
 
+def array_table(results: Results, summary: Mapping[str, Any]) -> Table | None:
+    """What a frame costs on a camera's emulated array; None where no camera runs on one."""
+    cost = summary.get("simd")
+    if cost is None:
+        return None
+    rows = [
+        ["cycles", f"{cost['cycles']:,}"],
+        [f"time at {cost['clock_mhz']:g} MHz", f"{1e-3 * cost['frame_us']:.3g} ms"],
+        ["share of the frame", f"{cost['share_of_frame']:.1%}"],
+        ["line memory", f"{cost['line_memory_words']} of {results.scenario.filter.simd.words} words"],
+        ["frames a second that it holds", f"{cost['rate_hz']:.3g}"],
+    ]
+    return Table(
+        "On a camera's processor array, which is emulated: the most of all cameras",
+        ("of a frame", "value"),
+        rows,
+    )
+
+
 def number(value: float | None, unit: str) -> str:
     """A length: to a millimetre, or to a tenth of a pixel."""
     return ABSENT if value is None else f"{value:.{1 if unit == 'px' else 3}f}"

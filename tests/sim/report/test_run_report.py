@@ -89,6 +89,18 @@ def test_a_report_tells_of_messages_and_members(dcpf, ran, small, page):
     assert "How many cameras take part" in read.text()
 
 
+def test_a_report_tells_what_a_frame_costs_on_the_array(dcpf, ran, small, page):
+    folder = ran(small, "--set", "filter.backend=simd")
+    cost = json.loads((folder / "summary.json").read_text())["simd"]
+    assert dcpf("report", folder).exit_code == 0
+
+    rows = page(folder / "report.html").rows("On a camera's processor array")
+
+    assert rows["cycles"] == [f"{cost['cycles']:,}"]
+    assert rows["line memory"] == [f"{cost['line_memory_words']} of 64 words"]
+    assert rows["time at 80 MHz"] == [f"{cost['frame_us'] / 1000:.3g} ms"]
+
+
 def test_members_are_drawn_as_they_were_counted(ran, small):
     folder = ran(small, *HANG, "--set", "frames=10")
     results, summary = read_run(folder), json.loads((folder / "summary.json").read_text())
