@@ -52,6 +52,10 @@ class Page:
         """Waits until an expression is true."""
         return self._wait_until(lambda: self.run(f"return {script}"))
 
+    def paints(self, selector, color):
+        """Waits until a canvas has a color, which a thin line between two pixels does not have."""
+        return self._wait_until(lambda: self.run(COLORS_OF, selector, color)[1])
+
     def text(self, selector):
         return self.run("return document.querySelector(arguments[0])?.textContent", selector)
 
@@ -95,12 +99,11 @@ def test_a_run_is_seen_and_the_death_of_a_node(launched, small, page):
     assert page.says("#node-B", "● running")
     assert page.shows("Number(document.body.dataset.frame) > 5")
     assert page.shows("document.querySelectorAll('figure[data-pictures]').length === 4")
-    n_colors, with_box = page.run(COLORS_OF, "#camera-A", VERMILLION)
-    assert n_colors > 500
-    assert with_box
-    assert page.run(COLORS_OF, "#map", VERMILLION)[1]
+    assert page.paints("#camera-A", VERMILLION)
+    assert page.run(COLORS_OF, "#camera-A", VERMILLION)[0] > 500
+    assert page.paints("#map", VERMILLION)
     assert page.shows("document.querySelector('#errors').width > 0")
-    assert page.run(COLORS_OF, "#errors", VERMILLION)[1]
+    assert page.paints("#errors", VERMILLION)
     assert page.shows("Number(document.body.dataset.picturesPerSecond) > 0")
     assert page.shows("document.querySelector('#dcpf-rate').textContent !== '–'")
 
@@ -144,7 +147,7 @@ def test_a_recording_is_turned_back_and_forth(launched, small, page, dcpf):
     assert page.says("#frame", "2 of 5")
     assert page.says("#cameras", "frame 2")
     assert page.shows("document.querySelector('#camera-C').width === 160")
-    assert page.run(COLORS_OF, "#camera-C", VERMILLION)[1]
+    assert page.paints("#camera-C", VERMILLION)
     page.run("speed.value = '8'; speed.dispatchEvent(new Event('change')); play.click()")
     assert page.says("#frame", "5 of 5")
     assert page.complaints() == []
