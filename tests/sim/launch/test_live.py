@@ -19,7 +19,10 @@ VERMILLION = "rgb(213, 94, 0)"
 # how many different colours a canvas shows, and whether one of them is there
 COLORS_OF = """
     const canvas = document.querySelector(arguments[0]);
-    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    const copy = new OffscreenCanvas(canvas.width, canvas.height)  // which may be read often
+        .getContext("2d", { willReadFrequently: true });
+    copy.drawImage(canvas, 0, 0);
+    const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
     const found = new Set();
     for (let i = 0; i < data.length; i += 4) found.add(`rgb(${data[i]}, ${data[i + 1]}, ${data[i + 2]})`);
     return [found.size, found.has(arguments[1])];
