@@ -16,8 +16,8 @@ pytestmark = [
 ]
 
 VERMILLION = (213, 94, 0)
-# how many different colours a canvas shows, and whether one is there, or nearly: a thin line that lies between
-# two pixels is a little of what is below it
+# how many different colours a canvas shows, and whether one is there, or nearly: a thin line between two
+# pixels is a little of what is below it
 COLORS_OF = """
     const canvas = document.querySelector(arguments[0]);
     const copy = new OffscreenCanvas(canvas.width, canvas.height)  // which may be read often
