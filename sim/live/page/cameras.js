@@ -59,7 +59,7 @@ class View {
   draw(story) {
     const context = this.canvas.getContext("2d");
     const { colors, labels, central } = story.setting;
-    const line = Math.max(1.5, this.canvas.width * LINE_SHARE);
+    const line = Math.max(2, Math.round(this.canvas.width * LINE_SHARE));
     context.drawImage(this.image, 0, 0, this.canvas.width, this.canvas.height);
     const frame = this.event.frame;
     this.box(context, boxOf(story, "truth", frame, this.name), colors.truth, line, [2 * line, 2 * line]);
@@ -84,7 +84,8 @@ class View {
   // Returns whether the box reaches into the picture.
   box(context, box, color, line, dash) {
     if (!box) return false;
-    const [left, top, right, bottom] = box;
+    // Lines that cover whole pixels keep their colour.
+    const [left, top, right, bottom] = box.map((edge) => Math.round(edge - line / 2) + line / 2);
     for (const [style, width, pattern] of [[HALO, line + 2, []], [color, line, dash]]) {
       Object.assign(context, { strokeStyle: style, lineWidth: width });
       context.setLineDash(pattern);
