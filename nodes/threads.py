@@ -13,7 +13,7 @@ from functools import lru_cache
 @lru_cache(maxsize=1)
 def n_cores() -> int:
     """Cores that this process may use."""
-    # not every system can tell which
+    # not every system can tell which; joblib, which can, would cost every node its import
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

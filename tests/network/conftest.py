@@ -93,10 +93,11 @@ def directory():
 
 @pytest.fixture
 def pair(directory):
-    """Two neighbours A and B in this process; B connects to A."""
+    """Two neighbours A and B in this process, B connects to A; and C is another one of A, who never comes."""
+    neighbors = {"A": ("B", "C"), "B": ("A",)}
     made = [
         ZenohTransport(
-            "run", name, Links(neighbors=(other,)), [f"unixsock-stream/{directory}/{name}.sock"],
+            "run", name, Links(neighbors[name]), [f"unixsock-stream/{directory}/{name}.sock"],
             [f"unixsock-stream/{directory}/{other}.sock"] if name == "B" else [], drop_late_pixels=False,
         )
         for name, other in ("AB", "BA")
