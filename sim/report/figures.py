@@ -114,23 +114,11 @@ def plot_members(results: Results, per_frame: Mapping[str, Sequence[int | None]]
     figure = Figure(figsize=(WIDTH_IN, 2.9), layout="constrained")
     axes = cleaned(figure.add_subplot())
     frames, color = np.arange(counts.shape[1]), COLORS["dcpf"]
-    axes.step(
-        frames,
-        counts.max(axis=0),
-        where="mid",
-        color=color,
-        linewidth=1.6,
-        label="the most that a node counts",
-    )
-    axes.step(
-        frames,
-        counts.min(axis=0),
-        where="mid",
-        color=color,
-        linewidth=0.8,
-        linestyle="--",
-        label="the fewest",
-    )
+    for counted, width, style, label in (
+        (counts.max(axis=0), 1.6, "-", "the most that a node counts"),
+        (counts.min(axis=0), 0.8, "--", "the fewest"),
+    ):
+        axes.step(frames, counted, style, where="mid", color=color, linewidth=width, label=label)
     axes.set(xlabel="frame", ylabel="members", xlim=(0, results.scenario.frames - 1))
     axes.set_ylim(0, len(results.scenario.cameras) + 0.5)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
