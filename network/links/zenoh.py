@@ -75,8 +75,8 @@ class ZenohTransport:
         self._gone: set[str] = set()  # since somebody last wanted to know
         self._away = set(self._heard)  # of those who speak to this node
         self._receivers: dict[type, tuple[str, ...]] = dict.fromkeys(links.receivers(), ())  # that are alive
-        # held whenever what has come, or who is there, is touched; by itself, since a condition's `with` takes
-        # two more calls of Python for each message
+        # held whenever what has come, or who is there, is touched; by itself, since the `with` of a condition
+        # takes two more calls of Python for each message
         self._lock = threading.RLock()
         self._changed = threading.Condition(self._lock)
         self._exchange: tuple[Take, Callable[[], Sequence[str]]] | None = None  # under way

@@ -19,7 +19,6 @@ from network.wire.messages import (
     EstimateMessage,
     PixelsMessage,
 )
-from nodes.central import Central
 from nodes.imaging.sources import FrameSource
 from nodes.shell.pace import Pace
 from nodes.shell.returning import LEAD, Returning
@@ -138,6 +137,11 @@ class Shell:
             self._reported_s = time.monotonic()
             self.report("running", index, counters)
 
+    def send(self, messages: Iterable[ConsensusMessage | EstimateMessage | ConfirmMessage]) -> None:
+        """Sends what a node has to say, in order."""
+        for message in messages:
+            self.transport.send(message)
+
     def report(self, state: State, frame: int, counters: Counters) -> None:
         """Tells everybody how the node is."""
         self.transport.send(self.telemetry.status(self.name, state, frame, self.transport.counters, counters))
@@ -182,7 +186,7 @@ def run_camera(node: SmartCamera, source: FrameSource, links: Links, shell: Shel
         outgoing = node.on_frame(index, image)
         shell.telemetry.local_filter_s.append(time.perf_counter() - began)
         # rounds with the neighbours, and the fusion filter at their end
-        _send(outgoing, shell)
+        shell.send(outgoing)
         begun[index] = shell.began(index)
         begun = {each: begun[each] for each in node.open_rounds}
         _rounds(node, begun, shell, frame=index + 1)
@@ -210,7 +214,7 @@ def _rounds(node: SmartCamera, begun: dict[int, float], shell: Shell, frame: int
     realtime = shell.pace.kind == "realtime"
     while not shell.stopped:
         # the fusion filter, where a frame's rounds are over
-        _send(node.on_rounds_over(), shell)
+        shell.send(node.on_rounds_over())
         if not node.open_rounds:
             break
         left_s = shell.begins_in_s(frame) if frame is not None and realtime else PATIENCE_S
@@ -224,16 +228,16 @@ def _rounds(node: SmartCamera, begun: dict[int, float], shell: Shell, frame: int
         # those who are gone, or late
         gone = sorted({name for name in node.awaited() if not shell.transport.alive(name)})
         for name in gone:
-            _send(node.on_lost(name), shell)
+            shell.send(node.on_lost(name))
         for each, end in {} if gone else _ends(node, begun, shell).items():
             if time.monotonic() >= end:
-                _send(node.on_round_deadline(each), shell)
+                shell.send(node.on_round_deadline(each))
                 break  # who is lost by it is lost for the other frames' rounds, too
     # those of which the time is up
     for each in list(node.open_rounds):
         if frame is not None and each + shell.pace.lag_frames < frame:
             shell.telemetry.late += 1
-            _send(node.on_deadline(each), shell)
+            shell.send(node.on_deadline(each))
     rounds = max(node.rounds.done - rounds, 1)
     shell.telemetry.consensus_round_s.append((time.perf_counter() - began) / rounds)
 
@@ -258,53 +262,3 @@ def _await_confirmation(sink: str, frame: int, confirmed: float, shell: Shell) -
         elif time.monotonic() > limit:
             return math.inf
     return confirmed
-
-
-def run_central(node: Central, links: Links, shell: Shell) -> None:
-    """The life of the central node."""
-    if not shell.wait_for_start(node.cameras):
-        return
-    while node.frame < shell.frames and not shell.stopped:
-        index = node.frame
-        shell.await_frame(index)
-        # cameras that were gone and send again
-        there = [camera for camera in links.cameras if shell.transport.alive(camera)]
-        if not node.cameras and not there:
-            break
-        _read(node, set(there) - node.cameras, shell, 0 if node.cameras else PATIENCE_S)
-        deadline = shell.began(index) + shell.pace.budget_s
-        while node.frame == index and node.cameras and not shell.stopped:
-            camera = node.waiting_for[0]
-            left = deadline - time.monotonic()
-            message = shell.transport.receive(camera, min(max(left, 0.0), PATIENCE_S))
-            if isinstance(message, PixelsMessage):
-                began = time.perf_counter()
-                _send(node.on_message(message), shell)
-                if node.frame != index:
-                    shell.telemetry.local_filter_s.append(time.perf_counter() - began)
-            elif not shell.transport.alive(camera) or (left <= 0 and shell.pace.kind == "lockstep"):
-                _send(node.on_lost(camera), shell)
-                deadline = shell.began(index) + shell.pace.budget_s
-            elif left <= 0:
-                shell.telemetry.late += 1
-                # those behind the one that was waited for
-                _read(node, node.waiting_for, shell)
-                if node.frame == index:
-                    _send(node.on_deadline(), shell)
-        shell.report_now_and_then(node.frame - 1, {})
-    shell.leave(node.frame - 1, {}, finished=node.frame == shell.frames)
-
-
-def _read(node: Central, cameras: Iterable[str], shell: Shell, timeout_s: float = 0) -> None:
-    """Takes all that has come from cameras; waits so long for the next."""
-    for camera in sorted(cameras):
-        while shell.transport.alive(camera):
-            message = shell.transport.receive(camera, timeout_s)
-            if not isinstance(message, PixelsMessage):
-                break
-            _send(node.on_message(message), shell)
-
-
-def _send(messages: Iterable[ConsensusMessage | EstimateMessage | ConfirmMessage], shell: Shell) -> None:
-    for message in messages:
-        shell.transport.send(message)

@@ -13,7 +13,8 @@ from network.links.disturbed import DisturbedTransport
 from network.links.runtime import NODE_RUNTIME
 from network.links.transport import Transport
 from network.links.zenoh import ZenohTransport
-from nodes.shell.process import Shell, run_camera, run_central
+from nodes.shell.central_process import run_central
+from nodes.shell.process import Shell, run_camera
 from sim.assembly import Assembly
 from sim.faults.process import FailingProcess
 from sim.scenario.parsing import ScenarioError
